@@ -52,7 +52,7 @@ from gen_data.core.serialization import canonical_json
 from gen_data.exporters import base, fragments, mask_png, rigid_models, rle, sensor_selection
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy, read_pixels
-from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
+from gen_data.exporters.sequences import check_frame_names, write_bytes, write_json, write_text
 
 TARGET_VISIBILITY = 0.1
 """Visible fraction from which an object is a target of the benchmark of 2019."""
@@ -168,7 +168,7 @@ class Bop(base.AssetExporter):
                     self._link_image(info, camera, shard_dir, image, folder)
                 if split == "test":
                     targets += [t for image in scene for t in _targets(number, image)]
-        write_text(dataset_dir / "test_targets_bop19.json", canonical_json(targets) + "\n")
+        write_json(dataset_dir / "test_targets_bop19.json", targets)
 
     def _folder_size(self, info: DatasetInfo) -> int:
         return CHUNK if self.folders == "thousand" else info.views_per_scene * info.steps_per_scene
@@ -385,7 +385,7 @@ def _write_scene(info: DatasetInfo, folder: Path, images: Sequence[Mapping[str, 
     for name, key in (("camera", "camera"), ("gt", "gt"), ("gt_info", "info")):
         rows = [(image["im_id"], image[key]) for image in images]
         write_text(folder / f"scene_{name}.json", _numbered_json(rows))
-    write_text(folder / "scene_gt_coco.json", canonical_json(_coco(info, images)) + "\n")
+    write_json(folder / "scene_gt_coco.json", _coco(info, images))
 
 
 def _numbered_json(rows: Iterable[tuple[int, Any]]) -> str:

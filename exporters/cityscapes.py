@@ -43,7 +43,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import boxes, scene_time, serialization, stereo
+from gen_data.core import boxes, scene_time, stereo
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo, media_path
@@ -53,12 +53,13 @@ from gen_data.exporters import base, fragments, image_files, label_png, label_re
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.sensor_selection import pinhole_camera, rgb_cameras
+from gen_data.exporters.sensor_selection import pinhole_camera, require_channels, rgb_cameras
 from gen_data.exporters.sequences import (
     camera_mount,
     check_frame_names,
     frame_facts,
     write_bytes,
+    write_json,
     write_text,
 )
 
@@ -88,12 +89,7 @@ class Cityscapes(base.AssetExporter):
         """
         camera = pinhole_camera(info, self.camera, self.type)
         needed = [Channel.INSTANCE, *([Channel.DISPARITY] if self.right else [])]
-        for channel in needed:
-            if channel not in info.media[camera]:
-                raise ConfigError(
-                    f"exporter '{self.type}': camera '{camera}' does not write the channel "
-                    f"{channel}; add it to the channels of the sensor"
-                )
+        require_channels(info, camera, needed, self.type)
         others = [name for name in rgb_cameras(info) if name != camera]
         if self.right and self.right not in others:
             raise ConfigError(
@@ -130,7 +126,7 @@ class Cityscapes(base.AssetExporter):
             text = json.dumps(polygons, sort_keys=True, separators=(",", ":"))
             write_text(_beside(stem, "polygons.json"), text + "\n")
             facts = camera_facts(sample.scene_of(camera), camera, self.right)
-            write_text(_beside(stem, "camera.json"), serialization.canonical_json(facts) + "\n")
+            write_json(_beside(stem, "camera.json"), facts)
             if self.right:
                 source = media_path(shard_dir, camera, Channel.DISPARITY, sample.index)
                 write_bytes(_beside(stem, "disparity.png"), disparity_png(source))

@@ -99,9 +99,14 @@ from gen_data.core.shutter import Shutter
 from gen_data.core.skeletons import Skeleton, find_skeleton
 from gen_data.exporters import base, ignored_regions, image_files, mask_polygons, rle, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
-from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
+from gen_data.exporters.fragments import (
+    fragment_lines,
+    fragment_rows,
+    image_splits,
+    write_fragments,
+)
 from gen_data.exporters.lens_fields import lens_fields
-from gen_data.exporters.sensor_selection import check_channels, instant_s, rgb_cameras
+from gen_data.exporters.sensor_selection import check_channels, instant_s, photographs
 
 DECIMALS = 9
 """Decimals of metres, matrices and fractions: far below any measurement error."""
@@ -146,26 +151,19 @@ class Coco(base.ExporterBase):
         """
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
-        for sample in samples:
-            for sensor in rgb_cameras(info):
-                if sensor not in sample.truth:
-                    continue
-                truth = sample.truth[sensor]
-                images = rows.setdefault(f"{sample.split}.images", [])
-                annotations = rows.setdefault(f"{sample.split}.annotations", [])
-                images.append(_image(info, sample, sensor))
-                visible = [thing for thing in truth.objects if thing.box is not None]
-                for thing, number in ignored_regions.numbered(info, visible):
-                    row = self._annotation(info, sample, sensor, thing)
-                    row["id"] = sample.annotation_id(sensor, number)
-                    annotations.append(row)
-                    if thing.keypoints is not None and number == thing.instance.instance_id:
-                        stem = f"{sample.split}.keypoints.{thing.instance.category_id}"
-                        rows.setdefault(stem, []).append(row | _named_points(thing.keypoints))
-        folder = shard_dir / self.type
-        folder.mkdir(parents=True, exist_ok=True)
-        for stem, lines in rows.items():
-            write_fragment(folder, stem, lines)
+        for sample, sensor in photographs(info, samples):
+            images = rows.setdefault(f"{sample.split}.images", [])
+            annotations = rows.setdefault(f"{sample.split}.annotations", [])
+            images.append(_image(info, sample, sensor))
+            visible = [thing for thing in sample.truth[sensor].objects if thing.box is not None]
+            for thing, number in ignored_regions.numbered(info, visible):
+                row = self._annotation(info, sample, sensor, thing)
+                row["id"] = sample.annotation_id(sensor, number)
+                annotations.append(row)
+                if thing.keypoints is not None and number == thing.instance.instance_id:
+                    stem = f"{sample.split}.keypoints.{thing.instance.category_id}"
+                    rows.setdefault(stem, []).append(row | _named_points(thing.keypoints))
+        write_fragments(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the lines of all shards, given in index order, and link the images."""

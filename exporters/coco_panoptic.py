@@ -39,7 +39,12 @@ from gen_data.exporters import base, label_colors, label_png, label_regions
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
-from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
+from gen_data.exporters.fragments import (
+    fragment_lines,
+    fragment_rows,
+    image_splits,
+    write_fragments,
+)
 from gen_data.exporters.image_files import link_or_copy, link_photograph
 from gen_data.exporters.sensor_selection import check_channels, photographs
 from gen_data.exporters.sequences import write_bytes
@@ -91,12 +96,9 @@ class CocoPanoptic(base.AssetExporter):
         for sample, sensor in photographs(info, samples):
             row = _write_segments(info, sample, sensor, shard_dir, self.library)
             rows.setdefault(f"{sample.split}.images", []).append(row)
-        folder = shard_dir / self.type
-        folder.mkdir(parents=True, exist_ok=True)
-        for stem, lines in rows.items():
-            write_fragment(folder, stem, lines)
         listed = (s["category"] for lines in rows.values() for line in lines for s in line["stuff"])
-        write_fragment(folder, "stuff", [{"name": name} for name in sorted(set(listed))])
+        stuff = [{"name": name} for name in sorted(set(listed))]
+        write_fragments(shard_dir / self.type, {**rows, "stuff": stuff})
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the categories of stuff, join the lines of all shards, and link the images."""

@@ -100,12 +100,7 @@ class ControlClips(base.ExporterBase):
                 empty, or there are too many samples for six digits.
         """
         camera = sensor_selection.rgb_camera(info, self.camera, self.type)
-        for channel in (Channel.Z_DEPTH, self._ids):
-            if channel not in info.media[camera]:
-                raise ConfigError(
-                    f"exporter '{self.type}': camera '{camera}' does not write the channel "
-                    f"{channel}; add it to the sensor's channels"
-                )
+        sensor_selection.require_channels(info, camera, (Channel.Z_DEPTH, self._ids), self.type)
         if (self.near_m is None) != (self.far_m is None) or not _increases(self._range()):
             raise ConfigError(
                 f"exporter '{self.type}': near_m {self.near_m}, far_m {self.far_m}; expected both, "
@@ -220,7 +215,7 @@ class ControlClips(base.ExporterBase):
             "segmentation": self.segmentation,
             "edges": {"canny_low": self.canny_low, "canny_high": self.canny_high},
         }
-        sequences.write_text(folder / "clip.json", canonical_json(facts) + "\n")
+        sequences.write_json(folder / "clip.json", facts)
         if self.video:
             for kind in IMAGES:
                 suffix = info.encoding(camera, Channel.RGB).suffix if kind == "rgb" else ".png"

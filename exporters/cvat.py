@@ -28,7 +28,7 @@ from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.exporters import coco, image_files, image_rows, label_colors
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_rows, image_splits
+from gen_data.exporters.fragments import split_rows
 from gen_data.exporters.mask_polygons import drawable_polygons
 
 OCCLUDED = 0.05
@@ -51,14 +51,11 @@ class Cvat(image_rows.ImageRowsExporter):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the images of each split, join their shapes, and link the images."""
-        folders = [shard_dir / self.type for shard_dir in shard_dirs]
-        splits = image_splits(folders)
-        for split in splits:
+        for split, rows in split_rows(shard_dirs, self.type):
             path = dataset_dir / split / "annotations.xml"
             path.parent.mkdir(parents=True, exist_ok=True)
             with path.open("w", encoding="utf-8", newline="\n") as file:
                 file.write(_head(info, split))
-                rows = fragment_rows(shard_dirs, self.type, f"{split}.images")
                 for number, (shard_dir, row) in enumerate(rows):
                     name = row["file_name"]
                     file.write(

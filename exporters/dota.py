@@ -63,9 +63,9 @@ class Dota(image_rows.ImageRowsExporter):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the label files and link the images."""
-        for split in fragments.image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
+        for split, rows in fragments.split_rows(shard_dirs, self.type):
             folder = dataset_dir / split
-            for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, f"{split}.images"):
+            for shard_dir, row in rows:
                 name = Path(row["file_name"])
                 text = "".join(f"{line}\n" for line in (*HEADER, *row["lines"]))
                 sequences.write_text(folder / f"labelTxt/{name.stem}.txt", text)

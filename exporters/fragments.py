@@ -19,6 +19,13 @@ def write_fragment(folder: Path, name: str, rows: Iterable[Mapping[str, Any]]) -
     (folder / f"{name}.jsonl").write_text(text, encoding="utf-8", newline="\n")
 
 
+def write_fragments(folder: Path, rows: Mapping[str, Iterable[Mapping[str, Any]]]) -> None:
+    """Write the rows of one shard by name of their fragment; creates the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, lines in rows.items():
+        write_fragment(folder, name, lines)
+
+
 def image_splits(folders: Iterable[Path]) -> list[str]:
     """Sorted splits with a fragment ``<split>.images.jsonl`` in any shard."""
     return sorted({p.name.split(".")[0] for f in folders for p in f.glob("*.images.jsonl")})
@@ -41,6 +48,14 @@ def fragment_rows(
     for shard_dir in shard_dirs:
         for line in fragment_lines([shard_dir / exporter], name):
             yield shard_dir, json.loads(line)
+
+
+def split_rows(
+    shard_dirs: Sequence[Path], exporter: str
+) -> Iterator[tuple[str, Iterator[tuple[Path, dict[str, Any]]]]]:
+    """Splits with images, sorted, each with its rows as ``fragment_rows`` yields them."""
+    for split in image_splits([shard_dir / exporter for shard_dir in shard_dirs]):
+        yield split, fragment_rows(shard_dirs, exporter, f"{split}.images")
 
 
 def numbered_stem(split: str, position: int, total: int, per_file: int) -> str:

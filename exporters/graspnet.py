@@ -61,8 +61,8 @@ class GraspNet(image_rows.ImageRowsExporter):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the arrays and link the images."""
-        for split in fragments.image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
-            for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, f"{split}.images"):
+        for split, rows in fragments.split_rows(shard_dirs, self.type):
+            for shard_dir, row in rows:
                 image = dataset_dir / split / row["file_name"]
                 for name, columns in (("grasps", 17), ("suctions", 8)):
                     file = io.BytesIO()

@@ -54,7 +54,7 @@ from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.exporters import base, fragments, image_files, npz
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.lens_fields import lens_fields
-from gen_data.exporters.sequences import write_text
+from gen_data.exporters.sequences import write_json
 
 KEYS = {
     Channel.RGB: "colors",
@@ -135,7 +135,7 @@ class Hdf5(base.ExporterBase):
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the containers of all shards into one tree."""
         categories = {str(k): name for k, name in enumerate(info.categories, 1)}
-        write_text(dataset_dir / "categories.json", serialization.canonical_json(categories) + "\n")
+        write_json(dataset_dir / "categories.json", categories)
         for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, FILES):
             image_files.link_or_copy(shard_dir / self.type / row["file"], dataset_dir / row["file"])
 

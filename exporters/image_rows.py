@@ -36,10 +36,7 @@ class ImageRowsExporter(base.ExporterBase):
             facts = self.image_row(info, sample, sensor)
             row = {**facts, "sensor": sensor, "sample": sample.index}
             rows.setdefault(f"{sample.split}.images", []).append(row)
-        folder = shard_dir / self.type
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, lines in rows.items():
-            fragments.write_fragment(folder, name, lines)
+        fragments.write_fragments(shard_dir / self.type, rows)
 
     @abstractmethod
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> Mapping[str, Any]:

@@ -36,7 +36,7 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.exporters import coco, image_files, image_rows, label_colors, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_rows, image_splits
+from gen_data.exporters.fragments import split_rows
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons
 
 LOCAL_FILES = "/data/local-files/?d="
@@ -77,15 +77,13 @@ class LabelStudio(image_rows.ImageRowsExporter):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the tasks of each split, link their images, and describe the interface."""
-        folders = [shard_dir / self.type for shard_dir in shard_dirs]
-        splits = image_splits(folders)
         keypoints: set[str] = set()
-        for split in splits:
+        for split, rows in split_rows(shard_dirs, self.type):
             path = dataset_dir / split / "tasks.json"
             path.parent.mkdir(parents=True, exist_ok=True)
             with path.open("w", encoding="utf-8", newline="\n") as file:
                 separator = "[\n"
-                for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+                for shard_dir, row in rows:
                     file.write(separator + row["task"])
                     separator = ",\n"
                     keypoints.update(row["keypoints"])

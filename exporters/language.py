@@ -49,7 +49,7 @@ from gen_data.exporters import (
 )
 from gen_data.exporters.coco import box_xywh, image_name, scene_graph
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
-from gen_data.exporters.fragments import fragment_rows, image_splits
+from gen_data.exporters.fragments import split_rows
 
 Layout = Literal["llava", "qwen2_5_vl", "qwen3_vl", "robospatial"]
 INNER = frozenset({"polygon"})
@@ -85,8 +85,8 @@ class LanguageJsonl(image_rows.ImageRowsExporter):
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the lines of all shards and link the images."""
         dataset_dir.mkdir(parents=True, exist_ok=True)
-        for split in image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
-            rows = _rows(fragment_rows(shard_dirs, self.type, f"{split}.images"), split)
+        for split, lines in split_rows(shard_dirs, self.type):
+            rows = _rows(lines, split)
             with ExitStack() as files:
 
                 def opened(name: str, files: ExitStack = files, split: str = split) -> IO[str]:

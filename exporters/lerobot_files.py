@@ -33,7 +33,7 @@ from gen_data.exporters.parquet_tables import (
     table_schema,
     value_feature,
 )
-from gen_data.exporters.sequences import Frame, write_text
+from gen_data.exporters.sequences import Frame, write_json
 from gen_data.exporters.step_geometry import OBJECTS, POSE, PREDICATES, Array, step_array
 
 if TYPE_CHECKING:
@@ -233,9 +233,6 @@ class RobotFiles(ABC):
             "features": self._features(),
         }
 
-    def _write_json(self, name: str, value: Any) -> None:
-        write_text(self.folder / name, serialization.canonical_json(value) + "\n")
-
 
 @dataclass(eq=False)
 class FilesV21(RobotFiles):
@@ -252,7 +249,7 @@ class FilesV21(RobotFiles):
             "total_chunks": -(-self._episodes // CHUNK_FILES),
             "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
         }
-        self._write_json("meta/info.json", self._facts() | totals)
+        write_json(self.folder / "meta/info.json", self._facts() | totals)
 
     def _write_episode(self, episode: _Episode) -> None:
         number = self._episodes
@@ -293,7 +290,7 @@ class FilesV30(RobotFiles):
             if writer is not None:
                 writer.close()
         _write_tasks(self.folder / "meta/tasks.parquet", self._tasks)
-        self._write_json("meta/stats.json", self._stats)
+        write_json(self.folder / "meta/stats.json", self._stats)
         facts = self._facts()
         for feature in facts["features"].values():
             feature["fps"] = facts["fps"]
@@ -302,7 +299,7 @@ class FilesV30(RobotFiles):
             "video_files_size_in_mb": 0,
             "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
         }
-        self._write_json("meta/info.json", facts | sizes)
+        write_json(self.folder / "meta/info.json", facts | sizes)
 
     def _write_episode(self, episode: _Episode) -> None:
         length = len(episode.frames)

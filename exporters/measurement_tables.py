@@ -27,7 +27,7 @@ from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import SAMPLE, Conventions
 from gen_data.exporters.npz import npy_bytes
-from gen_data.exporters.sequences import write_text
+from gen_data.exporters.sequences import write_json, write_text
 
 INDEX = "sample"
 
@@ -67,7 +67,7 @@ class Tables(ExporterBase):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the rows of every sequence."""
-        write_text(dataset_dir / "columns.json", canonical_json(_columns(info)) + "\n")
+        write_json(dataset_dir / "columns.json", _columns(info))
         for sensor in info.devices:
             folder = dataset_dir / sensor
             poses = (d / self.type / sensor / "poses.jsonl" for d in shard_dirs)

@@ -143,4 +143,4 @@ def world_rows(token: Tokens, frame: sequences.Frame, map_file: str) -> Iterator
 
 def write_splits(folder: Path, names: Mapping[str, Sequence[str]]) -> None:
     """Write the scenes of each split, and of ``all``, as the devkit reads custom splits."""
-    sequences.write_text(folder / "splits.json", canonical_json(names) + "\n")
+    sequences.write_json(folder / "splits.json", names)

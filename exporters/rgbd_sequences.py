@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, ClassVar
 
-from gen_data.core import capture, errors, intrinsics
+from gen_data.core import capture, intrinsics
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import Sample
 from gen_data.exporters import base, image_files, png, sensor_selection, sequences
@@ -29,13 +29,7 @@ class RgbdExporter(base.ExporterBase):
         Raises:
             ConfigError: the camera is missing, is not a pinhole or lacks a channel.
         """
-        camera = self._camera(info)
-        for channel in self.channels:
-            if channel not in info.media[camera]:
-                raise errors.ConfigError(
-                    f"exporter '{self.type}': camera '{camera}' does not write the channel "
-                    f"{channel.value}; add it to the channels of the sensor"
-                )
+        sensor_selection.require_channels(info, self._camera(info), self.channels, self.type)
 
     def _camera(self, info: DatasetInfo) -> str:
         return sensor_selection.pinhole_camera(info, self.camera, self.type)

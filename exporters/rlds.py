@@ -35,10 +35,9 @@ from pydantic import Field
 
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.serialization import canonical_json
 from gen_data.exporters import base, fragments, lerobot
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.sequences import Frame, write_text
+from gen_data.exporters.sequences import Frame, write_json
 from gen_data.exporters.step_geometry import OBJECTS, PREDICATES, Array, image_path, step_array
 from gen_data.exporters.tfrecord import Feature, encode_example, encode_features, frame_record
 
@@ -101,7 +100,7 @@ class Rlds(lerobot.LeRobot):
             kinds = {_key(name): array for name, array in known.items()}
             if key not in written:
                 facts = _describe(info, features, len(episode), kinds)
-                write_text(folder / "features.json", canonical_json(facts) + "\n")
+                write_json(folder / "features.json", facts)
             number = (written[key], totals[key], self.episodes_per_file)
             stem = fragments.numbered_stem("episodes", *number)
             floats = {*FLOATS, *_REWARDS, *(k for k, a in kinds.items() if a.dtype == "float32")}

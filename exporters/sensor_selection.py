@@ -50,12 +50,23 @@ def check_channels(info: DatasetInfo, channels: Iterable[Channel], exporter: str
     """
     rgb_camera(info, "", exporter)
     for camera in rgb_cameras(info):
-        missing = [c.value for c in channels if c not in info.media[camera]]
-        if missing:
-            raise ConfigError(
-                f"exporter '{exporter}': camera '{camera}' does not write the channel "
-                f"{_join_names(missing)}; add it to the channels of the sensor"
-            )
+        require_channels(info, camera, channels, exporter)
+
+
+def require_channels(
+    info: DatasetInfo, camera: str, channels: Iterable[Channel], exporter: str, remedy: str = ""
+) -> None:
+    """Reject a camera that lacks a channel; ``remedy`` ends the message.
+
+    Raises:
+        ConfigError: a channel is missing.
+    """
+    missing = [c.value for c in channels if c not in info.media[camera]]
+    if missing:
+        raise ConfigError(
+            f"exporter '{exporter}': camera '{camera}' does not write the channel "
+            f"{_join_names(missing)}; add it to the channels of the sensor{remedy}"
+        )
 
 
 def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> None:

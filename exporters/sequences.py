@@ -17,6 +17,7 @@ from typing import Any
 from gen_data.core import errors, interfaces, scene_time, se3
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 
 FRAMES = "frames"
@@ -207,6 +208,11 @@ def matrix_numbers(matrix: se3.Array) -> str:
 def write_text(path: Path, text: str) -> None:
     """Write UTF-8 with Unix line ends; creates the folder."""
     write_bytes(path, text.encode("utf-8"))
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a canonical JSON document and a line end; creates the folder."""
+    write_text(path, canonical_json(value) + "\n")
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -39,12 +39,11 @@ from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Camera, Scene
 from gen_data.core.scene_time import rig_twist
 from gen_data.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
-from gen_data.core.serialization import canonical_json
 from gen_data.exporters import base, fragments, image_files, label_png
 from gen_data.exporters.conventions import EDGES, PINHOLE, READING, Conventions
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_camera, rgb_cameras
-from gen_data.exporters.sequences import frame_facts, write_bytes, write_text
+from gen_data.exporters.sequences import frame_facts, write_bytes, write_json
 
 FORMAT_VERSION = "1.0.0-preview.1"
 """Version of Unity's Perception package whose schema the files follow."""
@@ -139,7 +138,7 @@ class Solo(base.ExporterBase):
                 "captures": captures,
                 "metrics": [],
             }
-            write_text(folder / f"{stem}.frame_data.json", canonical_json(frame) + "\n")
+            write_json(folder / f"{stem}.frame_data.json", frame)
             for capture in captures:
                 _link_images(info, shard_dir, capture, row["index"], folder)
         for split, counter in counts.items():
@@ -378,7 +377,7 @@ def _write_definitions(info: DatasetInfo, folder: Path, counter: _Counter) -> No
         },
     }
     for name, document in documents.items():
-        write_text(folder / f"{name}.json", canonical_json(document) + "\n")
+        write_json(folder / f"{name}.json", document)
 
 
 def _annotation_definitions(info: DatasetInfo) -> Iterator[dict[str, Any]]:

@@ -12,11 +12,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import demonstrations, errors, se3
+from gen_data.core import demonstrations, se3
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Predicate, Sample
 from gen_data.exporters.image_files import read_pixels
+from gen_data.exporters.sensor_selection import require_channels
 from gen_data.exporters.sequences import Frame
 
 Part = Literal["depth", "instances", "poses", "contacts", "relations", "calibration"]
@@ -66,13 +67,9 @@ def check(info: DatasetInfo, parts: Sequence[Part], cameras: Sequence[str], expo
         ConfigError: a camera lacks a channel.
     """
     for part, channel in IMAGES.items():
-        lacking = [c for c in cameras if part in parts and channel not in info.media[c]]
-        if lacking:
-            raise errors.ConfigError(
-                f"exporter '{exporter}': camera '{lacking[0]}' does not write the channel "
-                f"{channel.value}; add it to the channels of the sensor, or leave '{part}' out of "
-                "the exporter's geometry"
-            )
+        remedy = f", or leave '{part}' out of the exporter's geometry"
+        for camera in cameras if part in parts else ():
+            require_channels(info, camera, [channel], exporter, remedy)
 
 
 def step_values(

@@ -45,7 +45,7 @@ from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.image_files import link_or_copy, read_pixels
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.label_png import UInt16, encode_label_png, number_masks
-from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.exporters.sensor_selection import check_channels, photographs
 from gen_data.exporters.sequences import write_bytes, write_text
 
 YEAR = "VOCdevkit/VOC2012"
@@ -101,11 +101,10 @@ class Voc(base.ExporterBase):
             StorageError: an image is missing.
         """
         self.check(info)
-        rows = []
-        for sample in samples:
-            for sensor in rgb_cameras(info):
-                if sensor in sample.truth:
-                    rows.append(self._write_image(info, sample, sensor, shard_dir))
+        rows = [
+            self._write_image(info, sample, sensor, shard_dir)
+            for sample, sensor in photographs(info, samples)
+        ]
         fragments.write_fragment(shard_dir / self.type, "images", rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:

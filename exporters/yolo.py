@@ -101,20 +101,14 @@ class Yolo(base.ExporterBase):
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
         names: dict[int, dict[str, None]] = {}
-        for sample in samples:
-            for sensor in sensor_selection.rgb_cameras(info):
-                if sensor not in sample.truth:
-                    continue
-                row = self._image_row(info, sample, sensor)
-                rows.setdefault(f"{sample.split}.images", []).append(row)
-                for thing in (t for t in sample.truth[sensor].objects if not t.ignored):
-                    listed = names.setdefault(thing.instance.category_id, {})
-                    listed.update((p.name, None) for p in thing.keypoints or ())
-        folder = shard_dir / self.type
-        for stem, lines in rows.items():
-            fragments.write_fragment(folder, stem, lines)
+        for sample, sensor in sensor_selection.photographs(info, samples):
+            row = self._image_row(info, sample, sensor)
+            rows.setdefault(f"{sample.split}.images", []).append(row)
+            for thing in (t for t in sample.truth[sensor].objects if not t.ignored):
+                listed = names.setdefault(thing.instance.category_id, {})
+                listed.update((p.name, None) for p in thing.keypoints or ())
         points = [{"category_id": k, "names": list(names[k])} for k in sorted(names) if names[k]]
-        fragments.write_fragment(folder, "keypoints", points)
+        fragments.write_fragments(shard_dir / self.type, {**rows, "keypoints": points})
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the labels of each image and task, and link the images."""

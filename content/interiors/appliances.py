@@ -32,7 +32,7 @@ from gen_data.content.procedural.material_presets import (
 )
 from gen_data.content.procedural.patches import Patch
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _STEEL = metal_material(STAINLESS, 0.25)
 _DARK = painted_material("#1d1e20", 0.4)
@@ -48,9 +48,8 @@ def _case(rng: VariantRng) -> Material:
     return Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.3)
 
 
-def microwave(seed: int = 0) -> Solid:
+def microwave(rng: VariantRng) -> Solid:
     """A microwave oven. Slots: case, glass, steel."""
-    rng = variant_rng("microwave", seed)
     d = rng.between(0.32, 0.38, "depth_m")
     w = rng.between(0.44, 0.5, "width_m")
     h = rng.between(0.25, 0.29, "height_m")
@@ -67,9 +66,8 @@ def microwave(seed: int = 0) -> Solid:
     return solid(patches, [_case(rng), Material((0.02, 0.02, 0.022), 0.1), _STEEL], [body])
 
 
-def toaster(seed: int = 0) -> Solid:
+def toaster(rng: VariantRng) -> Solid:
     """A toaster with two slots. Slots: case, dark."""
-    rng = variant_rng("toaster", seed)
     d = rng.between(0.16, 0.19, "depth_m")
     w = rng.between(0.26, 0.3, "width_m")
     h = rng.between(0.17, 0.2, "height_m")
@@ -84,9 +82,8 @@ def toaster(seed: int = 0) -> Solid:
     return solid(patches, [_case(rng), _DARK], [body])
 
 
-def kettle(seed: int = 0) -> Solid:
+def kettle(rng: VariantRng) -> Solid:
     """An electric kettle on its base. Slots: case, dark."""
-    rng = variant_rng("kettle", seed)
     r, h = rng.between(0.07, 0.085, "radius_m"), rng.between(0.18, 0.23, "height_m")
     body = shapes.lathe(
         [
@@ -110,9 +107,8 @@ def kettle(seed: int = 0) -> Solid:
     return solid(patches, [_case(rng), _DARK], [((-r, -r, 0.0), (r, r, h + 0.03))])
 
 
-def coffee_maker(seed: int = 0) -> Solid:
+def coffee_maker(rng: VariantRng) -> Solid:
     """A coffee maker with a jug. Slots: case, jug."""
-    rng = variant_rng("coffee_maker", seed)
     w, h = rng.between(0.17, 0.2, "width_m"), rng.between(0.3, 0.36, "height_m")
     boxes: list[Box] = [
         ((-0.12, -0.5 * w, 0.0), (0.12, 0.5 * w, 0.04)),
@@ -127,9 +123,8 @@ def coffee_maker(seed: int = 0) -> Solid:
     return solid(patches, [_case(rng), Material((0.03, 0.02, 0.015), 0.08)], boxes)
 
 
-def cooking_pot(seed: int = 0) -> Solid:
+def cooking_pot(rng: VariantRng) -> Solid:
     """A pot, some with a lid. Slots: body, handles."""
-    rng = variant_rng("cooking_pot", seed)
     r, h = rng.between(0.08, 0.13, "radius_m"), rng.between(0.09, 0.16, "height_m")
     patches = [
         shapes.lathe(
@@ -152,9 +147,8 @@ def cooking_pot(seed: int = 0) -> Solid:
     return solid(patches, [body, _DARK], [((-0.75 * r, -r, 0.0), (0.75 * r, r, h))])
 
 
-def frying_pan(seed: int = 0) -> Solid:
+def frying_pan(rng: VariantRng) -> Solid:
     """A frying pan. Slots: body, handle."""
-    rng = variant_rng("frying_pan", seed)
     r, h = rng.between(0.1, 0.14, "radius_m"), rng.between(0.04, 0.055, "height_m")
     profile = [(0.0, 0.0), (0.8 * r, 0.0), (r, h), (r - 0.004, h), (0.8 * r, 0.005), (0.0, 0.005)]
     patches = [
@@ -168,17 +162,15 @@ def frying_pan(seed: int = 0) -> Solid:
     return solid(patches, [painted_material("#17181a", 0.45), _DARK], boxes)
 
 
-def cutting_board(seed: int = 0) -> Solid:
+def cutting_board(rng: VariantRng) -> Solid:
     """A cutting board. Slot: wood."""
-    rng = variant_rng("cutting_board", seed)
     x, y = 0.5 * rng.between(0.2, 0.28, "depth_m"), 0.5 * rng.between(0.3, 0.42, "width_m")
     flat: Box = ((-x, -y, 0.0), (x, y, 0.018))
     return solid([board(*flat, 0, 0.005)], [wood(rng, 0.6)], [flat])
 
 
-def printer(seed: int = 0) -> Solid:
+def printer(rng: VariantRng) -> Solid:
     """A printer with a sheet in its tray. Slots: case, dark, paper."""
-    rng = variant_rng("printer", seed)
     h = rng.between(0.17, 0.28, "height_m")
     body: Box = ((-0.18, -0.22, 0.0), (0.16, 0.22, h))
     patches = [
@@ -193,9 +185,8 @@ def printer(seed: int = 0) -> Solid:
     return solid(patches, [case, _DARK, painted_material("#f7f7f4", 0.9)], boxes)
 
 
-def speaker(seed: int = 0) -> Solid:
+def speaker(rng: VariantRng) -> Solid:
     """A loudspeaker. Slots: case, cones."""
-    rng = variant_rng("speaker", seed)
     d = rng.between(0.15, 0.25, "depth_m")
     w = rng.between(0.14, 0.22, "width_m")
     h = rng.between(0.24, 0.4, "height_m")
@@ -208,9 +199,8 @@ def speaker(seed: int = 0) -> Solid:
     return solid(patches, [wood(rng) if rng.chance(0.5) else _DARK, _DARK], [body])
 
 
-def desk_fan(seed: int = 0) -> Solid:
+def desk_fan(rng: VariantRng) -> Solid:
     """A fan. Slots: case, cage."""
-    rng = variant_rng("desk_fan", seed)
     r = rng.between(0.12, 0.17, "radius_m")
     z = r + 0.1
     patches = [
@@ -231,9 +221,8 @@ def desk_fan(seed: int = 0) -> Solid:
     return solid(patches, [_case(rng), _STEEL], [((-0.1, -r, 0.0), (0.06, r, z + r))])
 
 
-def router(seed: int = 0) -> Solid:
+def router(rng: VariantRng) -> Solid:
     """A router with aerials. Slots: case, dark."""
-    rng = variant_rng("router", seed)
     body: Box = ((-0.07, -0.11, 0.0), (0.07, 0.11, 0.032))
     patches = [cushion(*body, 0, 0.012)]
     for y in (-0.08, 0.08):
@@ -243,9 +232,8 @@ def router(seed: int = 0) -> Solid:
     )
 
 
-def game_console(seed: int = 0) -> Solid:
+def game_console(rng: VariantRng) -> Solid:
     """A game console. Slots: case, dark."""
-    rng = variant_rng("game_console", seed)
     body: Box = ((-0.13, -0.15, 0.0), (0.13, 0.15, rng.between(0.05, 0.08, "height_m")))
     patches = [
         shapes.block(*body, 0.012),
@@ -256,9 +244,8 @@ def game_console(seed: int = 0) -> Solid:
     )
 
 
-def basket(seed: int = 0) -> Solid:
+def basket(rng: VariantRng) -> Solid:
     """A woven basket, some with a blanket in it. Slots: body, cloth."""
-    rng = variant_rng("basket", seed)
     r, h = rng.between(0.14, 0.21, "radius_m"), rng.between(0.2, 0.38, "height_m")
     rows, columns = 40, 81
     s = np.linspace(0.0, 1.0, rows)[:, None]
@@ -288,9 +275,8 @@ def basket(seed: int = 0) -> Solid:
     return solid(patches, [body, soft], [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
 
 
-def ottoman(seed: int = 0) -> Solid:
+def ottoman(rng: VariantRng) -> Solid:
     """A padded footstool. Slots: cover, legs."""
-    rng = variant_rng("ottoman", seed)
     x = 0.5 * rng.between(0.4, 0.64, "depth_m")
     y = 0.5 * rng.between(0.44, 0.8, "width_m")
     z = rng.between(0.36, 0.44, "height_m")
@@ -300,9 +286,8 @@ def ottoman(seed: int = 0) -> Solid:
     return solid(patches, [cloth(rng), wood(rng)], [((-x, -y, 0.0), (x, y, z))])
 
 
-def coat_rack(seed: int = 0) -> Solid:
+def coat_rack(rng: VariantRng) -> Solid:
     """A stand for coats, some with coats on it. Slots: wood, cloth."""
-    rng = variant_rng("coat_rack", seed)
     h = rng.between(1.65, 1.85, "height_m")
     patches = [rod((0.0, 0.0, 0.02), (0.0, 0.0, h), 0.018, 0)]
     for k in range(4):
@@ -316,9 +301,8 @@ def coat_rack(seed: int = 0) -> Solid:
     return solid(patches, [wood(rng), wool(rng)], [((-0.2, -0.2, 0.0), (0.2, 0.2, h))])
 
 
-def ladder(seed: int = 0) -> Solid:
+def ladder(rng: VariantRng) -> Solid:
     """A step ladder, open. Slots: metal, feet."""
-    rng = variant_rng("ladder", seed)
     h, w = rng.between(1.1, 1.7, "height_m"), 0.22
     patches: list[Patch] = []
     for sy in (-1, 1):
@@ -339,9 +323,8 @@ def ladder(seed: int = 0) -> Solid:
     )
 
 
-def bucket(seed: int = 0) -> Solid:
+def bucket(rng: VariantRng) -> Solid:
     """A bucket. Slots: body, handle."""
-    rng = variant_rng("bucket", seed)
     r, h = rng.between(0.12, 0.15, "radius_m"), rng.between(0.24, 0.3, "height_m")
     profile = [
         (0.0, 0.0),
@@ -365,9 +348,8 @@ def bucket(seed: int = 0) -> Solid:
     )
 
 
-def fire_extinguisher(seed: int = 0) -> Solid:
+def fire_extinguisher(rng: VariantRng) -> Solid:
     """A fire extinguisher. Slots: red, dark."""
-    rng = variant_rng("fire_extinguisher", seed)
     r, h = rng.between(0.07, 0.09, "radius_m"), rng.between(0.4, 0.52, "height_m")
     body = shapes.lathe(
         [(0.0, 0.0), (r, 0.0), (r, h - 0.06), (0.6 * r, h - 0.02), (0.02, h), (0.0, h)], 32
@@ -380,9 +362,8 @@ def fire_extinguisher(seed: int = 0) -> Solid:
     return solid(patches, [painted_material("#b01218", 0.25), _DARK], [((-r, -r, 0.0), (r, r, h))])
 
 
-def soap_dispenser(seed: int = 0) -> Solid:
+def soap_dispenser(rng: VariantRng) -> Solid:
     """A soap dispenser. Slots: body, pump."""
-    rng = variant_rng("soap_dispenser", seed)
     r, h = rng.between(0.028, 0.038, "radius_m"), rng.between(0.11, 0.15, "height_m")
     patches = [
         disc(0, 0, 0.0, h, r, 0, 30),
@@ -394,9 +375,8 @@ def soap_dispenser(seed: int = 0) -> Solid:
     return solid(patches, [body, _STEEL], [((-r, -r, 0.0), (r, r, h + 0.04))])
 
 
-def toilet_paper(seed: int = 0) -> Solid:
+def toilet_paper(rng: VariantRng) -> Solid:
     """A roll of toilet paper. Slots: paper, core."""
-    rng = variant_rng("toilet_paper", seed)
     r = rng.between(0.04, 0.058, "radius_m")
     ring = [(0.02, 0.0), (r, 0.0), (r, 0.1), (0.02, 0.1), (0.02, 0.0)]
     return solid(
@@ -406,9 +386,8 @@ def toilet_paper(seed: int = 0) -> Solid:
     )
 
 
-def tissue_box(seed: int = 0) -> Solid:
+def tissue_box(rng: VariantRng) -> Solid:
     """A box of tissues. Slots: card, paper."""
-    rng = variant_rng("tissue_box", seed)
     body: Box = ((-0.06, -0.11, 0.0), (0.06, 0.11, rng.between(0.06, 0.1, "height_m")))
     h = body[1][2]
     sheet = cushion((-0.015, -0.05, h - 0.01), (0.015, 0.05, h + 0.06), 1, 0.014)
@@ -419,9 +398,8 @@ def tissue_box(seed: int = 0) -> Solid:
     )
 
 
-def alarm_clock(seed: int = 0) -> Solid:
+def alarm_clock(rng: VariantRng) -> Solid:
     """An alarm clock. Slots: case, face."""
-    rng = variant_rng("alarm_clock", seed)
     w, h = 0.5 * rng.between(0.1, 0.16, "width_m"), rng.between(0.06, 0.1, "height_m")
     body: Box = ((-0.03, -w, 0.0), (0.03, w, h))
     face = shapes.block((0.03, -0.85 * w, 0.12 * h), (0.031, 0.85 * w, 0.88 * h), 0.0, 1)
@@ -431,9 +409,8 @@ def alarm_clock(seed: int = 0) -> Solid:
     )
 
 
-def shoes(seed: int = 0) -> Solid:
+def shoes(rng: VariantRng) -> Solid:
     """A pair of shoes. Slots: upper, sole."""
-    rng = variant_rng("shoes", seed)
     patches: list[Patch] = []
     for y in (-0.06, 0.06):
         patches.append(cushion((-0.13, y - 0.045, 0.0), (0.14, y + 0.045, 0.025), 1, 0.012))

@@ -37,7 +37,7 @@ from gen_data.content.procedural.material_presets import (
 from gen_data.content.procedural.patches import Patch
 from gen_data.core.asset_types import Keypoint, Material
 from gen_data.core.keypoint_names import SUPPORT
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _PAPER = painted_material("#f5f3ec", 0.85)
 _DARK = painted_material("#1d1e20", 0.5)
@@ -47,9 +47,8 @@ def _plastic(rng: VariantRng) -> Material:
     return Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4)
 
 
-def book_stack(seed: int = 0) -> Solid:
+def book_stack(rng: VariantRng) -> Solid:
     """Books lying on each other. Slots: covers, pages."""
-    rng = variant_rng("book_stack", seed)
     patches: list[Patch] = []
     z, reach = 0.0, [0.0, 0.0]
     for k in range(rng.whole(2, 7, "count")):
@@ -73,22 +72,20 @@ def book_stack(seed: int = 0) -> Solid:
     return solid(patches, [*covers, painted_material("#e9e2d0", 0.9)], [((-x, -y, 0.0), (x, y, z))])
 
 
-def magazine(seed: int = 0) -> Solid:
+def magazine(rng: VariantRng) -> Solid:
     """A magazine. Slots: pages, cover."""
-    rng = variant_rng("magazine", seed)
     x, y, t = 0.14, 0.105, rng.between(0.003, 0.007, "thickness_m")
     body: Box = ((-x, -y, 0.0), (x, y, t))
     # The front of a cover's sheet.
     u0, v0, u1, v1 = COVER_ATLAS["front"]
     corners = [[(x, -y, t + 2e-4), (x, y, t + 2e-4)], [(-x, -y, t + 2e-4), (-x, y, t + 2e-4)]]
     face = shapes.grid(np.array(corners), np.array([u0, u1]), np.array([v0, v1]))
-    look = printed_material(f"texture/book_cover?seed={seed}", 0.3)
+    look = printed_material(f"texture/book_cover?seed={rng.seed}", 0.3)
     return solid([shapes.block(*body), face.painted(1)], [_PAPER, look], [body])
 
 
-def paper_stack(seed: int = 0) -> Solid:
+def paper_stack(rng: VariantRng) -> Solid:
     """Sheets of paper in a loose stack, A4 (ISO 216). Slot: paper."""
-    rng = variant_rng("paper_stack", seed)
     patches: list[Patch] = []
     z = 0.0
     for _ in range(rng.whole(2, 7, "count")):
@@ -100,9 +97,8 @@ def paper_stack(seed: int = 0) -> Solid:
     return solid(patches, [_PAPER], [((-0.15, -0.11, 0.0), (0.15, 0.11, z))])
 
 
-def binder_row(seed: int = 0) -> Solid:
+def binder_row(rng: VariantRng) -> Solid:
     """Binders side by side, spines towards +X. Slots: covers, labels."""
-    rng = variant_rng("binder_row", seed)
     patches: list[Patch] = []
     y, count = 0.0, rng.whole(2, 8, "count")
     for _ in range(count):
@@ -123,9 +119,8 @@ def binder_row(seed: int = 0) -> Solid:
     return solid(moved, [*looks, _PAPER, _DARK], [box])
 
 
-def pen_cup(seed: int = 0) -> Solid:
+def pen_cup(rng: VariantRng) -> Solid:
     """A cup with pens. Slots: cup, pens."""
-    rng = variant_rng("pen_cup", seed)
     r, h = rng.between(0.034, 0.042, "radius_m"), rng.between(0.09, 0.11, "height_m")
     cup = shapes.lathe(
         [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.003, h), (r - 0.003, 0.004), (0.0, 0.004)], 28
@@ -143,9 +138,8 @@ def pen_cup(seed: int = 0) -> Solid:
     return solid(patches, looks, [((-r, -r, 0.0), (r, r, h))])
 
 
-def desk_lamp(seed: int = 0) -> Solid:
+def desk_lamp(rng: VariantRng) -> Solid:
     """A lamp with a jointed arm. Slots: metal, shade, bulb."""
-    rng = variant_rng("desk_lamp", seed)
     a, b = rng.between(0.3, 0.4), rng.between(0.26, 0.34)
     lean, reach = rng.between(-0.5, -0.25), rng.between(0.9, 1.3, "reach_m")
     elbow = (math.sin(lean) * a, 0.0, 0.02 + math.cos(lean) * a)
@@ -175,9 +169,8 @@ def desk_lamp(seed: int = 0) -> Solid:
     return replace(made, keypoints=(Keypoint("lamp", below, 0.2),))
 
 
-def dish_rack(seed: int = 0) -> Solid:
+def dish_rack(rng: VariantRng) -> Solid:
     """Plates, cups and bowls that drain. Slots: wire, dishes, tray."""
-    rng = variant_rng("dish_rack", seed)
     x, y = 0.16, 0.5 * rng.between(0.36, 0.46, "width_m")
     patches: list[Patch] = [shapes.block((-x, -y, 0.0), (x, y, 0.012), 0.004, 3)]
     for z in (0.025, 0.11):
@@ -212,9 +205,8 @@ def dish_rack(seed: int = 0) -> Solid:
     return solid(patches, looks, [((-x, -y, 0.0), (x, y, 0.2))])
 
 
-def plate_stack(seed: int = 0) -> Solid:
+def plate_stack(rng: VariantRng) -> Solid:
     """Plates or bowls on each other. Slot: glaze."""
-    rng = variant_rng("plate_stack", seed)
     r, deep = rng.between(0.1, 0.135, "radius_m"), rng.turn((False, True), "deep")
     rise, step = (0.06, 0.018) if deep else (0.02, 0.0085)
     radius = 0.7 * r if deep else r
@@ -233,9 +225,8 @@ def plate_stack(seed: int = 0) -> Solid:
     )
 
 
-def fruit_bowl(seed: int = 0) -> Solid:
+def fruit_bowl(rng: VariantRng) -> Solid:
     """A bowl with apples and oranges. Slots: bowl, fruit."""
-    rng = variant_rng("fruit_bowl", seed)
     r, h = rng.between(0.12, 0.15, "radius_m"), rng.between(0.06, 0.085, "height_m")
     profile = [(0.0, 0.0), (0.45 * r, 0.0), (0.8 * r, 0.4 * h), (r, h), (r - 0.005, h),
                (0.77 * r, 0.42 * h), (0.43 * r, 0.006), (0.0, 0.006)]  # fmt: skip
@@ -253,9 +244,8 @@ def fruit_bowl(seed: int = 0) -> Solid:
     return solid(patches, [bowl, *skins], [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, 0.13))])
 
 
-def knife_block(seed: int = 0) -> Solid:
+def knife_block(rng: VariantRng) -> Solid:
     """Knives in a leaning block of wood. Slots: wood, handles, steel."""
-    rng = variant_rng("knife_block", seed)
     block = board((-0.05, -0.05, 0.0), (0.05, 0.05, 0.2), 0, 0.004).rotated("y", -0.35)
     patches = [block.moved(0.03, 0.0, 0.017)]
     for row in range(2):
@@ -268,9 +258,8 @@ def knife_block(seed: int = 0) -> Solid:
     return solid(patches, [wood(rng), _DARK], [box])
 
 
-def utensil_pot(seed: int = 0) -> Solid:
+def utensil_pot(rng: VariantRng) -> Solid:
     """A pot with wooden spoons and ladles. Slots: pot, wood, steel."""
-    rng = variant_rng("utensil_pot", seed)
     r, h = rng.between(0.05, 0.065, "radius_m"), rng.between(0.13, 0.17, "height_m")
     pot = shapes.lathe(
         [(0.0, 0.0), (0.9 * r, 0.0), (r, h), (r - 0.005, h), (0.86 * r, 0.006), (0.0, 0.006)], 30
@@ -292,9 +281,8 @@ def utensil_pot(seed: int = 0) -> Solid:
     return solid(patches, looks, [((-0.9 * r, -0.9 * r, 0.0), (0.9 * r, 0.9 * r, h))])
 
 
-def spice_rack(seed: int = 0) -> Solid:
+def spice_rack(rng: VariantRng) -> Solid:
     """Small jars in two rows of a rack. Slots: rack, glass, caps, spices."""
-    rng = variant_rng("spice_rack", seed)
     w = rng.between(0.28, 0.4, "width_m")
     patches: list[Patch] = [
         board((-0.06, -0.5 * w, 0.0), (0.06, -0.5 * w + 0.012, 0.26)),
@@ -322,9 +310,8 @@ def spice_rack(seed: int = 0) -> Solid:
     )
 
 
-def paper_towel(seed: int = 0) -> Solid:
+def paper_towel(rng: VariantRng) -> Solid:
     """Kitchen paper on a stand. Slots: stand, paper."""
-    rng = variant_rng("paper_towel", seed)
     r = rng.between(0.045, 0.065, "radius_m")
     roll = shapes.lathe([(0.02, 0.015), (r, 0.015), (r, 0.24), (0.02, 0.24), (0.02, 0.015)], 32, 1)
     patches = [disc(0, 0, 0.0, 0.014, 0.075, 0, 32), rod((0, 0, 0.01), (0, 0, 0.3), 0.008, 0), roll]
@@ -336,9 +323,8 @@ def paper_towel(seed: int = 0) -> Solid:
     )
 
 
-def toothbrush_cup(seed: int = 0) -> Solid:
+def toothbrush_cup(rng: VariantRng) -> Solid:
     """A cup with toothbrushes. Slots: cup, brushes."""
-    rng = variant_rng("toothbrush_cup", seed)
     r, h = 0.036, rng.between(0.09, 0.11, "height_m")
     cup = shapes.lathe(
         [(0.0, 0.0), (r, 0.0), (1.05 * r, h), (r, h), (0.92 * r, 0.005), (0.0, 0.005)], 28
@@ -361,9 +347,8 @@ def toothbrush_cup(seed: int = 0) -> Solid:
     return solid(patches, looks, [((-r, -r, 0.0), (r, r, h))])
 
 
-def shampoo(seed: int = 0) -> Solid:
+def shampoo(rng: VariantRng) -> Solid:
     """A bottle of shampoo or shower gel. Slots: bottle, cap, label."""
-    rng = variant_rng("shampoo", seed)
     x = 0.5 * rng.between(0.036, 0.052, "depth_m")
     y = 0.5 * rng.between(0.056, 0.08, "width_m")
     h = rng.between(0.15, 0.22, "height_m")
@@ -374,16 +359,15 @@ def shampoo(seed: int = 0) -> Solid:
     looks = [
         _plastic(rng),
         _plastic(rng),
-        printed_material(f"texture/book_cover?seed={seed + 5}", 0.35),
+        printed_material(f"texture/book_cover?seed={rng.seed + 5}", 0.35),
     ]
     return solid(
         [body, flat, cap, shapes.block(*label, 0.0, 2)], looks, [((-x, -y, 0.0), (x, y, h))]
     )
 
 
-def toilet_brush(seed: int = 0) -> Solid:
+def toilet_brush(rng: VariantRng) -> Solid:
     """A toilet brush in its pot. Slots: pot, handle."""
-    rng = variant_rng("toilet_brush", seed)
     pot = shapes.lathe([(0.0, 0.0), (0.05, 0.0), (0.045, 0.14), (0.02, 0.15), (0.0, 0.15)], 28)
     patches = [
         pot,
@@ -394,9 +378,8 @@ def toilet_brush(seed: int = 0) -> Solid:
     return solid(patches, [look, look], [((-0.045, -0.045, 0.0), (0.045, 0.045, 0.16))])
 
 
-def bathroom_scale(seed: int = 0) -> Solid:
+def bathroom_scale(rng: VariantRng) -> Solid:
     """A scale to stand on. Slots: body, display."""
-    rng = variant_rng("bathroom_scale", seed)
     body: Box = ((-0.15, -0.15, 0.0), (0.15, 0.15, 0.028))
     display: Box = ((0.08, -0.045, 0.0275), (0.12, 0.045, 0.0288))
     paint = painted_material(rng.choose(("#f2f2f0", "#1d1e20", "#b9c2bd")), 0.15)
@@ -405,9 +388,8 @@ def bathroom_scale(seed: int = 0) -> Solid:
     )
 
 
-def power_strip(seed: int = 0) -> Solid:
+def power_strip(rng: VariantRng) -> Solid:
     """A strip of sockets with a curled cable. Slots: body, sockets, cable."""
-    rng = variant_rng("power_strip", seed)
     count = rng.turn((3, 4, 5, 6), "sockets")
     half = 0.5 * (0.045 * count + 0.05)
     body: Box = ((-0.026, -half, 0.0), (0.026, half, 0.038))
@@ -423,9 +405,8 @@ def power_strip(seed: int = 0) -> Solid:
     return solid([*patches, cable], [pale, _DARK, pale], [body])
 
 
-def game_box(seed: int = 0) -> Solid:
+def game_box(rng: VariantRng) -> Solid:
     """Boxes of games or puzzles on each other. Slots: sides, prints."""
-    rng = variant_rng("game_box", seed)
     patches: list[Patch] = []
     z, x, y = 0.0, 0.0, 0.0
     sizes = sorted(
@@ -445,13 +426,12 @@ def game_box(seed: int = 0) -> Solid:
         patches += [p.rotated("z", turn).moved(0.0, 0.0, z) for p in part]
         z, x, y = z + t + 3e-4, max(x, a), max(y, b)
     colors = [Material(draw_linear(PALETTES["cloth"], 0.2, rng), 0.45) for _ in range(2)]
-    look = printed_material(f"texture/book_cover?seed={seed + 9}", 0.35)
+    look = printed_material(f"texture/book_cover?seed={rng.seed + 9}", 0.35)
     return solid(patches, [*colors, look], [((-x, -y, 0.0), (x, y, z))])
 
 
-def plush_toy(seed: int = 0) -> Solid:
+def plush_toy(rng: VariantRng) -> Solid:
     """A sitting bear or rabbit of plush. Slots: plush, belly, eyes."""
-    rng = variant_rng("plush_toy", seed)
     s = rng.between(0.8, 1.3, "scale")
     rabbit = rng.turn((False, False, True), "rabbit")
 
@@ -489,9 +469,8 @@ def plush_toy(seed: int = 0) -> Solid:
     return solid(moved, [fur, belly, painted_material("#101010", 0.1)], [box])
 
 
-def backpack(seed: int = 0) -> Solid:
+def backpack(rng: VariantRng) -> Solid:
     """A rucksack that stands. Slots: cloth, straps."""
-    rng = variant_rng("backpack", seed)
     x = 0.5 * rng.between(0.18, 0.24, "depth_m")
     y = 0.5 * rng.between(0.28, 0.34, "width_m")
     h = rng.between(0.4, 0.5, "height_m")
@@ -514,9 +493,8 @@ def backpack(seed: int = 0) -> Solid:
     return solid(patches, [dark, _DARK], [((-x, -y, 0.0), (x + 0.04, y, h))])
 
 
-def guitar(seed: int = 0) -> Solid:
+def guitar(rng: VariantRng) -> Solid:
     """A guitar on its stand. Slots: wood, fingerboard, top, stand."""
-    rng = variant_rng("guitar", seed)
     t = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
     radius = 0.165 + 0.03 * np.cos(2.0 * t) + 0.028 * np.cos(t) * np.cos(t) * -np.cos(t)
     outline = np.stack([radius * np.sin(t) * 0.98, -1.25 * radius * np.cos(t)], axis=1)
@@ -544,9 +522,8 @@ def guitar(seed: int = 0) -> Solid:
     return solid([*stood, *legs], [look, painted_material("#2b1d14", 0.4), spruce, _DARK], [box])
 
 
-def dumbbells(seed: int = 0) -> Solid:
+def dumbbells(rng: VariantRng) -> Solid:
     """A pair of dumbbells. Slots: heads, bars."""
-    rng = variant_rng("dumbbells", seed)
     r = rng.between(0.035, 0.05, "radius_m")
     patches: list[Patch] = []
     for x in (-1.2 * r, 1.2 * r):
@@ -563,9 +540,8 @@ def dumbbells(seed: int = 0) -> Solid:
     )
 
 
-def step_stool(seed: int = 0) -> Solid:
+def step_stool(rng: VariantRng) -> Solid:
     """Two steps to stand on. Slots: steps, legs."""
-    rng = variant_rng("step_stool", seed)
     w = rng.between(0.36, 0.42, "width_m")
     y = 0.5 * w
     steps: list[Box] = [((-0.22, -y, 0.4), (0.02, y, 0.425)), ((-0.02, -y, 0.2), (0.22, y, 0.225))]
@@ -578,9 +554,8 @@ def step_stool(seed: int = 0) -> Solid:
     )
 
 
-def drill(seed: int = 0) -> Solid:
+def drill(rng: VariantRng) -> Solid:
     """A cordless drill that stands on its battery. Slots: body, rubber, steel."""
-    rng = variant_rng("drill", seed)
     patches = [
         shapes.block((-0.05, -0.035, 0.0), (0.06, 0.035, 0.045), 0.008, 1),
         cushion((-0.02, -0.018, 0.04), (0.022, 0.018, 0.16), 1, 0.014),
@@ -596,18 +571,16 @@ def drill(seed: int = 0) -> Solid:
     return solid(patches, [paint, _DARK, metal_material(STEEL, 0.3)], boxes)
 
 
-def tape_roll(seed: int = 0) -> Solid:
+def tape_roll(rng: VariantRng) -> Solid:
     """A roll of adhesive tape. Slot: tape."""
-    rng = variant_rng("tape_roll", seed)
     r, h = rng.between(0.045, 0.06, "radius_m"), rng.between(0.02, 0.05, "height_m")
     ring = shapes.lathe([(0.038, 0.0), (r, 0.0), (r, h), (0.038, h), (0.038, 0.0)], 36)
     colors = ("#b08a54", "#1d1e20", "#d9d8d4", "#b3261e", "#2f5d9c")
     return solid([ring], [painted_material(rng.choose(colors), 0.3)], [((-r, -r, 0.0), (r, r, h))])
 
 
-def open_carton(seed: int = 0) -> Solid:
+def open_carton(rng: VariantRng) -> Solid:
     """An open box with packing paper in it. Slots: cardboard, paper."""
-    rng = variant_rng("open_carton", seed)
     x = 0.5 * rng.between(0.3, 0.48, "depth_m")
     y = 0.5 * rng.between(0.36, 0.6, "width_m")
     h = rng.between(0.2, 0.36, "height_m")
@@ -629,13 +602,12 @@ def open_carton(seed: int = 0) -> Solid:
         )
         patches.append(turned.moved(sx * (x - 0.002), 0.0, h))
     patches.append(cushion((-x + 0.008, -y + 0.008, t), (x - 0.008, y - 0.008, 0.72 * h), 1, 0.05))
-    card = patterned_material(f"texture/cardboard?seed={seed % 16}", 0.5, 0.85)
+    card = patterned_material(f"texture/cardboard?seed={rng.seed % 16}", 0.5, 0.85)
     return solid(patches, [card, fabric(rng) if rng.chance(0.4) else _PAPER], walls)
 
 
-def trolley(seed: int = 0) -> Solid:
+def trolley(rng: VariantRng) -> Solid:
     """A rolling table with three trays. Slots: trays, posts."""
-    rng = variant_rng("trolley", seed)
     x, y = 0.2, 0.5 * rng.between(0.52, 0.72, "width_m")
     levels = (0.14, 0.46, 0.8)
     trays: list[Box] = [((-x, -y, z), (x, y, z + 0.012)) for z in levels]
@@ -656,9 +628,8 @@ def trolley(seed: int = 0) -> Solid:
     return replace(made, keypoints=tuple(Keypoint(SUPPORT, corner) for corner in corners))
 
 
-def radio(seed: int = 0) -> Solid:
+def radio(rng: VariantRng) -> Solid:
     """A radio with a cloth front. Slots: case, cloth, knobs."""
-    rng = variant_rng("radio", seed)
     w, h, d = rng.between(0.2, 0.3, "width_m"), rng.between(0.12, 0.16, "height_m"), 0.09
     case: Box = ((-0.5 * d, -0.5 * w, 0.0), (0.5 * d, 0.5 * w, h))
     mesh: Box = ((0.5 * d, -0.46 * w, 0.1 * h), (0.5 * d + 0.003, 0.15 * w, 0.9 * h))
@@ -666,7 +637,7 @@ def radio(seed: int = 0) -> Solid:
     for k in range(2):
         y, z = 0.32 * w, h * (0.3 + 0.4 * k)
         patches.append(rod((0.5 * d, y, z), (0.5 * d + 0.014, y, z), 0.016, 2, 20))
-    weave = patterned_material(f"texture/fabric?seed={seed % 16}", 0.1, 0.95)
-    shell = LACQUERS[seed % len(LACQUERS)]
+    weave = patterned_material(f"texture/fabric?seed={rng.seed % 16}", 0.1, 0.95)
+    shell = LACQUERS[rng.seed % len(LACQUERS)]
     body = wood(rng) if rng.chance(0.5) else painted_material(shell, 0.4)
     return solid(patches, [body, weave, metal_material(STAINLESS, 0.3)], [case])

@@ -9,9 +9,11 @@ from gen_data.assets.family import Solid
 from gen_data.content.interiors.parts import (
     HOUSEHOLD,
     Box,
+    Measures,
     board,
     cloth,
     disc,
+    drawn,
     front,
     lacquer,
     rod,
@@ -60,9 +62,8 @@ def _tube(r0: float, r1: float, z0: float, z1: float, slot: int) -> Patch:
     return shapes.lathe(profile, 40, slot)
 
 
-def ceiling_lamp(seed: int = 0) -> Solid:
+def ceiling_lamp(rng: VariantRng) -> Solid:
     """A lamp under the ceiling, which is at z = 0. Slots: metal, shade."""
-    rng = variant_rng("ceiling_lamp", seed)
     paint = rng.choose(
         (
             painted_material("#26282b", 0.4),
@@ -70,7 +71,7 @@ def ceiling_lamp(seed: int = 0) -> Solid:
             painted_material("#eeece6", 0.4),
         )
     )
-    if seed % 3 == 0:
+    if rng.seed % 3 == 0:
         r, h = rng.between(0.16, 0.26, "radius_m"), rng.between(0.07, 0.12, "height_m")
         glow = shapes.lathe(
             [(r, -0.02), (r, -0.5 * h), (0.86 * r, -0.85 * h), (0.5 * r, -h), (0.0, -1.04 * h)][
@@ -95,9 +96,8 @@ def ceiling_lamp(seed: int = 0) -> Solid:
     return _with_lamp(made, (0.0, 0.0, -drop - 0.02))
 
 
-def tube_lamp(seed: int = 0) -> Solid:
+def tube_lamp(rng: VariantRng) -> Solid:
     """A long lamp under the ceiling, which is at z = 0. Slots: housing, tube."""
-    rng = variant_rng("tube_lamp", seed)
     w, d = rng.between(1.15, 1.5, "width_m"), rng.between(0.1, 0.2, "depth_m")
     box: Box = ((-0.5 * d, -0.5 * w, -0.06), (0.5 * d, 0.5 * w, 0.0))
     tube: Box = ((-0.4 * d, -0.48 * w, -0.075), (0.4 * d, 0.48 * w, -0.06))
@@ -106,24 +106,13 @@ def tube_lamp(seed: int = 0) -> Solid:
     return _with_lamp(made, (0.0, 0.0, -0.13))
 
 
-def floor_lamp(seed: int = 0) -> Solid:
-    """A lamp on a pole. Slots: metal, shade."""
-    rng = variant_rng("floor_lamp", seed)
-    return _standing_lamp(
-        rng, rng.between(1.35, 1.65, "top_m"), rng.between(0.17, 0.24, "shade_m"), 0.14
-    )
+def standing_lamp(family: str, seed: int, measures: Measures) -> Solid:
+    """A lamp on a pole with a foot. Slots: metal, shade.
 
-
-def table_lamp(seed: int = 0) -> Solid:
-    """A lamp for tables. Slots: metal, shade."""
-    rng = variant_rng("table_lamp", seed)
-    return _standing_lamp(
-        rng, rng.between(0.34, 0.52, "top_m"), rng.between(0.1, 0.15, "shade_m"), 0.075
-    )
-
-
-def _standing_lamp(rng: VariantRng, top_m: float, shade_m: float, foot_m: float) -> Solid:
-    z, r = top_m, shade_m
+    Measures: height, radii of shade and foot.
+    """
+    rng = variant_rng(family, seed)
+    z, r, foot_m = drawn(rng, measures).values()
     h = r * rng.between(0.9, 1.3)
     paint = rng.choose(
         (
@@ -146,9 +135,8 @@ def _standing_lamp(rng: VariantRng, top_m: float, shade_m: float, foot_m: float)
     return _with_lamp(solid(patches, [paint, _shade(rng)], boxes), (0.0, 0.0, z + 0.06))
 
 
-def curtain(seed: int = 0) -> Solid:
+def curtain(rng: VariantRng) -> Solid:
     """A curtain on a piece of rail; origin at the middle below. Slots: cloth, rail."""
-    rng = variant_rng("curtain", seed)
     w, h = rng.between(0.4, 0.7, "width_m"), rng.between(2.1, 2.35, "height_m")
     count = round(w / 0.095)
     y = np.linspace(-0.5 * w, 0.5 * w, count * 10 + 1)[None, :]
@@ -194,15 +182,14 @@ def curtain(seed: int = 0) -> Solid:
     )
 
 
-def rug(seed: int = 0) -> Solid:
+def rug(rng: VariantRng) -> Solid:
     """A rug, rectangular or round. Slots: pile, border."""
-    rng = variant_rng("rug", seed)
     pile = patterned_material(
         f"texture/carpet?seed={int(rng.between(0, 16))}", rng.between(0.4, 0.6), 1.0
     )
     edge = replace(pile, texture=f"texture/carpet?seed={int(rng.between(0, 16))}")
     t = 0.012
-    if seed % 4 == 3:
+    if rng.seed % 4 == 3:
         r = rng.between(0.6, 1.0, "radius_m")
         return solid(
             [disc(0, 0, 0, t, r, 0, 56)],
@@ -223,15 +210,15 @@ def photograph(seed: int, *, upright: bool) -> str:
     return f"texture/wall_art?seed={kind + MOTIFS * (2 * (seed // 4 % 3) + (not upright))}"
 
 
-def picture(seed: int = 0) -> Solid:
+def picture(rng: VariantRng) -> Solid:
     """A framed picture; origin at the middle below, on the wall. Slots: frame, mount, print."""
-    rng = variant_rng("picture", seed)
     # From postcards to large prints; the small ones are common.
     long = rng.choose((rng.between(0.13, 0.24), rng.between(0.26, 0.45), rng.between(0.45, 0.92)))
-    if seed % 9 == 8:
-        image, short, upright = f"texture/poster?seed={seed % 12}", long / math.sqrt(2.0), True
+    if rng.seed % 9 == 8:
+        image, short, upright = f"texture/poster?seed={rng.seed % 12}", long / math.sqrt(2.0), True
     else:
-        image, short, upright = f"texture/wall_art?seed={seed}", 0.75 * long, is_upright(seed)
+        image, short = f"texture/wall_art?seed={rng.seed}", 0.75 * long
+        upright = is_upright(rng.seed)
     wide, high = (short, long) if upright else (long, short)
     f = rng.between(0.01, 0.018 + 0.012 * long)
     mount = rng.choose((0.0, rng.between(0.1, 0.2) * long, rng.between(0.15, 0.3) * short))
@@ -263,9 +250,8 @@ def picture(seed: int = 0) -> Solid:
     return solid(patches, [edge, card, printed_material(image, gloss)], [back])
 
 
-def mirror(seed: int = 0) -> Solid:
+def mirror(rng: VariantRng) -> Solid:
     """A mirror for walls; origin at the middle of its lower edge. Slots: frame, glass."""
-    rng = variant_rng("mirror", seed)
     w, h = rng.between(0.45, 0.9, "width_m"), rng.between(0.6, 1.1, "height_m")
     f = rng.between(0.008, 0.04)
     glass = rectangle(
@@ -297,9 +283,8 @@ def _frame(
     return [board(*p, 0, radius_m) for p in parts]
 
 
-def radiator(seed: int = 0) -> Solid:
+def radiator(rng: VariantRng) -> Solid:
     """A heater for walls; origin at the middle of its lower edge. Slots: panel, valve."""
-    rng = variant_rng("radiator", seed)
     w, h = rng.between(0.6, 1.4, "width_m"), rng.between(0.4, 0.6, "height_m")
     count = round(w / 0.05)
     patches = [shapes.block((0.03, -0.5 * w, 0.0), (0.09, 0.5 * w, h), 0.008)]
@@ -323,19 +308,9 @@ def radiator(seed: int = 0) -> Solid:
     )
 
 
-def television(seed: int = 0) -> Solid:
-    """A television on feet, on or off by its lit screen. Slots: housing, screen."""
-    rng = variant_rng("television", seed)
-    return _screen(rng.between(0.9, 1.35, "width_m"), 0.05, "television")
-
-
-def monitor(seed: int = 0) -> Solid:
-    """A monitor on a stand. Slots: housing, screen."""
-    rng = variant_rng("monitor", seed)
-    return _screen(rng.between(0.5, 0.65, "width_m"), 0.13, "monitor")
-
-
-def _screen(w: float, lift_m: float, name: str) -> Solid:
+def screen(family: str, seed: int, measures: Measures) -> Solid:
+    """A screen on its stand, on or off. Slots: housing, screen. Measures: width, lower edge."""
+    w, lift_m = drawn(variant_rng(family, seed), measures).values()
     h = w * 9 / 16 + 0.02
     y = 0.5 * w
     panel: Box = ((-0.02, -y, lift_m), (0.015, y, lift_m + h))
@@ -343,7 +318,7 @@ def _screen(w: float, lift_m: float, name: str) -> Solid:
         (0.0155, -y + 0.008, lift_m + 0.012), (0.0, w - 0.016, 0.0), (0.0, 0.0, h - 0.02)
     ).painted(1)
     patches = [shapes.block(*panel, 0.004), glass]
-    if name == "monitor":
+    if family == "monitor":
         patches += [
             shapes.block((-0.09, -0.11, 0.0), (0.09, 0.11, 0.012), 0.004),
             shapes.block((-0.045, -0.03, 0.01), (-0.02, 0.03, lift_m + 0.15), 0.004),
@@ -425,9 +400,8 @@ def _housing(rng: VariantRng) -> Material:
     return metal_material(ALUMINIUM, 0.4) if rng.chance(0.6) else painted_material("#2a2c2f", 0.45)
 
 
-def house_plant(seed: int = 0) -> Solid:
+def house_plant(rng: VariantRng) -> Solid:
     """A plant in a pot. Slots: pot, soil, leaves."""
-    rng = variant_rng("house_plant", seed)
     big = rng.turn((True, False), "big")
     r, h = (
         (rng.between(0.14, 0.2), rng.between(0.24, 0.36))
@@ -485,9 +459,8 @@ def _leaf(rng: VariantRng, length: float) -> Patch:
     return join_patches([sheet, sheet.flipped()])
 
 
-def waste_basket(seed: int = 0) -> Solid:
+def waste_basket(rng: VariantRng) -> Solid:
     """A waste basket. Slot: body."""
-    rng = variant_rng("waste_basket", seed)
     r, h = rng.between(0.12, 0.17, "radius_m"), rng.between(0.26, 0.36, "height_m")
     body = shapes.lathe(
         [
@@ -510,9 +483,8 @@ def waste_basket(seed: int = 0) -> Solid:
     return solid([body], [paint], [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
 
 
-def wall_clock(seed: int = 0) -> Solid:
+def wall_clock(rng: VariantRng) -> Solid:
     """A round clock for walls; origin at its lowest point. Slots: case, face, hands."""
-    rng = variant_rng("wall_clock", seed)
     r = rng.between(0.12, 0.18, "radius_m")
     case = shapes.lathe(
         [(0.0, 0.0), (r, 0.0), (r, 0.035), (r - 0.012, 0.04), (r - 0.012, 0.025), (0.0, 0.025)], 48
@@ -530,9 +502,8 @@ def wall_clock(seed: int = 0) -> Solid:
     return solid(patches, looks, [((0.0, -r, 0.0), (0.04, r, 2 * r))])
 
 
-def whiteboard(seed: int = 0) -> Solid:
+def whiteboard(rng: VariantRng) -> Solid:
     """A board to write on; origin at the middle below, on the wall. Slots: frame, board."""
-    rng = variant_rng("whiteboard", seed)
     w, h = rng.between(1.2, 1.8, "width_m"), rng.between(0.9, 1.2, "height_m")
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.012, 0.5 * w - 0.004, h - 0.004))
     tray: Box = ((0.0, -0.3 * w, -0.01), (0.06, 0.3 * w, 0.0))
@@ -543,14 +514,13 @@ def whiteboard(seed: int = 0) -> Solid:
         y = rng.between(-0.25, 0.2) * w
         patches.append(rod((0.03, y, 0.009), (0.03, y + 0.13, 0.009), 0.009, 3 + k % 3, 12))
     inks = [painted_material(ink, 0.4) for ink in ("#1f2a5a", "#a3261d", "#1f1f20")]
-    written = printed_material(f"texture/whiteboard_notes?seed={seed}", 0.15)
+    written = printed_material(f"texture/whiteboard_notes?seed={rng.seed}", 0.15)
     looks = [metal_material(ALUMINIUM, 0.4), painted_material("#f5f6f5", 0.15), written, *inks]
     return solid(patches, looks, [back])
 
 
-def book_row(seed: int = 0) -> Solid:
+def book_row(rng: VariantRng) -> Solid:
     """Books that stand side by side, spines towards +X. Slots: one per cloth, pages last."""
-    rng = variant_rng("book_row", seed)
     covers = [
         Material(draw_linear((*PALETTES["cloth"], *_JACKETS), 0.15, rng), rng.between(0.3, 0.8))
         for _ in range(9)
@@ -617,9 +587,8 @@ def _standing_book(
     return made
 
 
-def picture_frame(seed: int = 0) -> Solid:
+def picture_frame(rng: VariantRng) -> Solid:
     """A framed photograph that stands, leaning back. Slots: frame, mount, print."""
-    rng = variant_rng("picture_frame", seed)
     w = rng.between(0.1, 0.2, "width_m")
     h = rng.between(0.13, 0.24, "height_m")
     f = rng.between(0.008, 0.02)
@@ -633,6 +602,6 @@ def picture_frame(seed: int = 0) -> Solid:
     ]
     leaning = [patch.rotated("y", -0.22) for patch in patches]
     stand = board((-0.055, -0.015, 0.0), (-0.05, 0.015, 0.45 * h), 1)
-    look = printed_material(photograph(seed, upright=True), 0.15)
+    look = printed_material(photograph(rng.seed, upright=True), 0.15)
     boxes: list[Box] = [((-0.22 * h, -0.5 * w, 0.0), (0.014, 0.5 * w, h))]
     return solid([*leaning, stand], [front(rng), painted_material("#4a4038", 0.8), look], boxes)

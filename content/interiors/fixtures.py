@@ -23,15 +23,14 @@ from gen_data.content.procedural.patches import Patch
 from gen_data.core.asset_types import Keypoint, Material
 from gen_data.core.keypoint_names import DRAIN, SUPPORT, TAP
 from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _X = 0.29
 _CHROME = metal_material(STAINLESS, 0.15)
 
 
-def kitchen_sink(seed: int = 0) -> Solid:
+def kitchen_sink(rng: VariantRng) -> Solid:
     """A unit with a sink, as ``kitchen_unit``. Slots: carcass, front, steel, worktop."""
-    rng = variant_rng("kitchen_sink", seed)
     patches = _base(hole=True)
     basin = [
         ((-0.17, -0.2, 0.72), (0.19, 0.2, 0.726)),
@@ -61,7 +60,7 @@ def kitchen_sink(seed: int = 0) -> Solid:
     ]
     made = solid(
         patches,
-        _looks("kitchen_unit", rng, seed),
+        _looks("kitchen_unit", rng, rng.seed),
         [((-_X, -0.3, 0.0), (_X, 0.3, 0.72)), *_worktop(hole=True)],
     )
     return _with_water(made, (-0.22, 0.0, 0.9), height, 0.726)
@@ -113,9 +112,8 @@ def tap_stream(length_m: float = 0.2) -> Solid:
     return solid([stream], [water], [((-0.004, -0.004, -length_m), (0.004, 0.004, 0.0))])
 
 
-def cooker(seed: int = 0) -> Solid:
+def cooker(rng: VariantRng) -> Solid:
     """An oven under a hob of glass. Slots: carcass, front, steel, worktop, glass, marks."""
-    rng = variant_rng("cooker", seed)
     patches = _base(hole=False)
     patches.append(shapes.block((-0.25, -0.285, 0.9), (0.26, 0.285, 0.906), 0.002, 4))
     for x, y, r in (
@@ -164,7 +162,7 @@ def cooker(seed: int = 0) -> Solid:
         turn = rng.between(-2.4, 2.4) if rng.chance(0.25) else 0.0
         patches.append(mark.rotated("x", turn).moved(x, y, 0.8))
     looks = [
-        *_looks("kitchen_unit", rng, seed),
+        *_looks("kitchen_unit", rng, rng.seed),
         Material((0.012, 0.012, 0.013), 0.06),
         painted_material("#9a9a98", 0.4),
     ]
@@ -210,19 +208,17 @@ def _worktop(*, hole: bool) -> list[Box]:
     ]
 
 
-def range_hood(seed: int = 0) -> Solid:
+def range_hood(rng: VariantRng) -> Solid:
     """A hood over a cooker; origin at the middle below. Slot: body."""
-    rng = variant_rng("range_hood", seed)
     d, h = rng.between(0.44, 0.5, "depth_m"), rng.between(0.5, 0.7, "height_m")
     low: Box = ((-0.5 * d, -0.3, 0.0), (0.5 * d, 0.3, 0.06))
     duct: Box = ((-0.5 * d, -0.14, 0.06), (-0.5 * d + 0.26, 0.14, h))
-    paint = brushed_steel(seed) if rng.chance(0.7) else painted_material("#1f2022", 0.25)
+    paint = brushed_steel(rng.seed) if rng.chance(0.7) else painted_material("#1f2022", 0.25)
     return solid([shapes.block(*low, 0.006), shapes.block(*duct, 0.004)], [paint], [low, duct])
 
 
-def toilet(seed: int = 0) -> Solid:
+def toilet(rng: VariantRng) -> Solid:
     """A toilet with cistern or built into the wall. Slots: ceramic, seat."""
-    rng = variant_rng("toilet", seed)
     z = rng.between(0.4, 0.44, "seat_m")
     cistern = rng.turn((True, False), "cistern")
     outline = [
@@ -259,9 +255,8 @@ def toilet(seed: int = 0) -> Solid:
     return solid(patches, [ceramic(), painted_material("#f4f3f0", 0.25)], boxes)
 
 
-def wash_basin(seed: int = 0) -> Solid:
+def wash_basin(rng: VariantRng) -> Solid:
     """A basin on a cupboard. Slots: ceramic, front, steel."""
-    rng = variant_rng("wash_basin", seed)
     d, w = rng.between(0.42, 0.5, "depth_m"), rng.turn((0.5, 0.6, 0.8), "width_m")
     x, y, z = 0.5 * d, 0.5 * w, 0.86
     height = rng.between(0.1, 0.18, "tap_m")
@@ -291,9 +286,8 @@ def wash_basin(seed: int = 0) -> Solid:
     return replace(made, keypoints=(*made.keypoints, *supports))
 
 
-def bathtub(seed: int = 0) -> Solid:
+def bathtub(rng: VariantRng) -> Solid:
     """A bathtub. Slots: ceramic, panel, steel."""
-    rng = variant_rng("bathtub", seed)
     d = rng.turn((0.7, 0.75, 0.8), "depth_m")
     w = rng.turn((1.6, 1.7, 1.8), "width_m")
     z = rng.between(0.52, 0.58, "height_m")
@@ -325,9 +319,8 @@ def bathtub(seed: int = 0) -> Solid:
     return _with_water(made, (-x + 0.05, 0.0, z), 0.12, 0.15)
 
 
-def shower(seed: int = 0) -> Solid:
+def shower(rng: VariantRng) -> Solid:
     """A shower: tray, pole with head, and panes of glass. Slots: ceramic, steel, glass."""
-    rng = variant_rng("shower", seed)
     d = rng.turn((0.8, 0.9, 1.0), "width_m")
     x = 0.5 * d
     tray: Box = ((-x, -x, 0.0), (x, x, 0.06))

@@ -5,16 +5,15 @@ import numpy as np
 from gen_data.content.procedural.textures.texture_images import quantize
 from gen_data.core.asset_types import Float32, TextureData
 from gen_data.core.noise import fbm, smoothstep
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _PX = 1024
 _HORIZON = 0.36
 """Height of the horizon, as a share of the image's height from below."""
 
 
-def outdoor_view(seed: int) -> TextureData:
+def outdoor_view(rng: VariantRng) -> TextureData:
     """A panorama half as wide as the full circle: gardens, houses or a town under a sky."""
-    rng = variant_rng("outdoor_view", seed)
     y = ((np.arange(_PX) + 0.5) / _PX).astype(np.float32)[::-1, None]
     image = _sky(y, rng)
     for depth in range(3):

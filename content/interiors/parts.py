@@ -1,7 +1,8 @@
 """Parts of furniture: boards, cushions, legs and rods, and the materials they are made of."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from gen_data.core.se3 import Vec3
 from gen_data.core.variant_rng import VariantRng, in_turn
 
 Box = tuple[Vec3, Vec3]
+Measures = Mapping[str, Any]
+"""Sizes [m], counts and choices of a family by name, as ``families.yaml`` lists them: a value,
+``[low, high]`` to draw between, ``{turn: [...]}``, or ``{by: name, value: measure, ...}`` after an
+earlier one."""
 LACQUERS = (
     *("#f1f0ec", "#f1f0ec", "#eceae5", "#e6e4de", "#d9d7d1", "#b7b6b2", "#8b8c8c", "#3b3d3f"),
     *("#b9c2bd", "#66737a", "#939d8d"),
@@ -43,6 +48,21 @@ _WOODS = 18
 _FABRICS = 16
 _STEEL_SHEETS = (7, 13, 14)
 """Seeds of ``texture/brushed_metal`` that are neutral and bright."""
+
+
+def drawn(rng: VariantRng, measures: Measures) -> dict[str, Any]:
+    """The measures of a variant by name; draws are taken in the order of the row."""
+    made: dict[str, Any] = {}
+    for name, given in measures.items():
+        if isinstance(given, list):
+            low, high = given
+            made[name] = rng.between(low, high, name)
+        elif isinstance(given, Mapping):
+            by = given.get("by")
+            made[name] = given[made[by]] if by else rng.turn(tuple(given["turn"]), name)
+        else:
+            made[name] = given
+    return made
 
 
 def board(low: Vec3, high: Vec3, slot: int = 0, radius_m: float = 0.002) -> Patch:

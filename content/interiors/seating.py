@@ -9,9 +9,11 @@ import numpy as np
 from gen_data.assets.family import Solid
 from gen_data.content.interiors.parts import (
     Box,
+    Measures,
     board,
     cushion,
     disc,
+    drawn,
     four_legs,
     front,
     lacquer,
@@ -39,17 +41,11 @@ PIPING_HEIGHT = 0.9
 """Of a cushion's half height: below its top, so that things lie flat."""
 
 
-def sofa(seed: int = 0) -> Solid:
-    """A sofa for two to four. Slots: cover, legs, pillows."""
-    rng = variant_rng("sofa", seed)
-    places = rng.turn((2, 3, 4), "places")
-    return _upholstered(rng, places, places * rng.between(0.58, 0.68, "seat_width_m"))
-
-
-def armchair(seed: int = 0) -> Solid:
-    """An armchair. Slots: cover, legs, pillows."""
-    rng = variant_rng("armchair", seed)
-    return _upholstered(rng, 1, rng.between(0.52, 0.62, "seat_width_m"))
+def upholstered(family: str, seed: int, measures: Measures) -> Solid:
+    """A sofa or an armchair. Slots: cover, legs, pillows. Measures: places and width of each."""
+    rng = variant_rng(family, seed)
+    places, place_m = drawn(rng, measures).values()
+    return _upholstered(rng, places, places * place_m)
 
 
 def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
@@ -157,9 +153,8 @@ def _bent(patch: Patch, wrap_per_m: float, lumbar_m: float) -> Patch:
     return replace(patch, corners_m=p)
 
 
-def chair(seed: int = 0) -> Solid:
+def chair(rng: VariantRng) -> Solid:
     """A chair for tables, wooden, upholstered or a shell on steel. Slots: seat, legs."""
-    rng = variant_rng("chair", seed)
     w = rng.between(0.4, 0.48, "width_m")
     d = rng.between(0.42, 0.48, "depth_m")
     z = rng.between(0.44, 0.47, "seat_m")
@@ -210,9 +205,8 @@ def chair(seed: int = 0) -> Solid:
     return replace(made, keypoints=(*supports, Keypoint(BACKREST, edge)))
 
 
-def stool(seed: int = 0) -> Solid:
+def stool(rng: VariantRng) -> Solid:
     """A stool, low or at bar height. Slots: seat, legs."""
-    rng = variant_rng("stool", seed)
     z = rng.turn((0.45, 0.65), "seat_m") + rng.between(-0.02, 0.02)
     r = rng.between(0.15, 0.19, "radius_m")
     patches = [disc(0, 0, z - 0.035, z, r, 0, 32)]
@@ -227,9 +221,8 @@ def stool(seed: int = 0) -> Solid:
     )
 
 
-def office_chair(seed: int = 0) -> Solid:
+def office_chair(rng: VariantRng) -> Solid:
     """A swivel chair on five castors. Slots: cover, base."""
-    rng = variant_rng("office_chair", seed)
     w, z = rng.between(0.46, 0.52, "width_m"), rng.between(0.44, 0.52, "seat_m")
     top = z + rng.between(0.48, 0.7)
     high, half = top - z - 0.08, 0.46 * w
@@ -283,66 +276,23 @@ def office_chair(seed: int = 0) -> Solid:
     return replace(made, keypoints=(Keypoint(BACKREST, edge),))
 
 
-def dining_table(seed: int = 0) -> Solid:
-    """A table for meals, rectangular or round. Slots: top, legs."""
-    rng = variant_rng("dining_table", seed)
-    if rng.turn((False, False, False, True), "round_top"):
-        return _round_table(
-            rng, rng.between(0.45, 0.6, "radius_m"), rng.between(0.73, 0.76, "height_m")
-        )
-    return _rectangular_table(
-        rng,
-        rng.between(0.75, 0.95, "depth_m"),
-        rng.between(1.2, 1.9, "width_m"),
-        rng.between(0.73, 0.76, "height_m"),
-    )
+def table(
+    family: str,
+    seed: int,
+    sides: Measures | None = None,
+    round_top: Measures | None = None,
+    round_in_turn: Sequence[bool] = (),
+) -> Solid:
+    """A table with a rectangular top, a round one, or either in turn. Slots: top, legs."""
+    rng = variant_rng(family, seed)
+    is_round = rng.turn(tuple(round_in_turn), "round_top") if round_in_turn else not sides
+    if is_round:
+        return _round_table(rng, **drawn(rng, round_top or {}))
+    return _rectangular_table(rng, **drawn(rng, sides or {}))
 
 
-def coffee_table(seed: int = 0) -> Solid:
-    """A low table. Slots: top, legs."""
-    rng = variant_rng("coffee_table", seed)
-    if rng.turn((False, False, True), "round_top"):
-        return _round_table(
-            rng, rng.between(0.34, 0.45, "radius_m"), rng.between(0.38, 0.46, "height_m")
-        )
-    return _rectangular_table(
-        rng,
-        rng.between(0.5, 0.65, "depth_m"),
-        rng.between(0.8, 1.2, "width_m"),
-        rng.between(0.36, 0.46, "height_m"),
-    )
-
-
-def side_table(seed: int = 0) -> Solid:
-    """A small table beside a seat. Slots: top, legs."""
-    rng = variant_rng("side_table", seed)
-    return _round_table(rng, rng.between(0.2, 0.26, "radius_m"), rng.between(0.45, 0.6, "height_m"))
-
-
-def desk(seed: int = 0) -> Solid:
-    """A desk, some with drawers at one side. Slots: top, legs."""
-    rng = variant_rng("desk", seed)
-    return _rectangular_table(
-        rng,
-        rng.between(0.6, 0.8, "depth_m"),
-        rng.between(1.2, 1.8, "width_m"),
-        rng.between(0.72, 0.76, "height_m"),
-        drawers=rng.turn((False, True), "drawers"),
-        cables=True,
-    )
-
-
-def meeting_table(seed: int = 0) -> Solid:
-    """A long table for meetings. Slots: top, legs."""
-    rng = variant_rng("meeting_table", seed)
-    return _rectangular_table(
-        rng, rng.between(0.9, 1.2, "depth_m"), rng.between(1.8, 2.6, "width_m"), 0.74
-    )
-
-
-def workbench(seed: int = 0) -> Solid:
+def workbench(rng: VariantRng) -> Solid:
     """A workbench with a thick top and a lower board. Slots: top, legs."""
-    rng = variant_rng("workbench", seed)
     d = rng.between(0.6, 0.75, "depth_m")
     w = rng.between(1.4, 2.0, "width_m")
     z = rng.between(0.82, 0.92, "height_m")

@@ -20,7 +20,7 @@ from gen_data.content.procedural.material_presets import (
 from gen_data.content.procedural.patches import Patch, join_patches
 from gen_data.core.asset_types import Material
 from gen_data.core.se3 import Array, Vec3
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _LINEN = ("#f3f1ec", "#f1f1ef", "#e8e9ea", "#e6e0d6", "#cfd3d5", "#dfe3e3", "#b9c3cb", "#a9aaa9")
 
@@ -200,9 +200,8 @@ def drape(
     )
 
 
-def bed(seed: int = 0) -> Solid:
+def bed(rng: VariantRng) -> Solid:
     """A bed of 0.9 to 1.8 m, made; its head at -X. Slots: frame, mattress, duvet, pillows."""
-    rng = variant_rng("bed", seed)
     w = rng.turn((0.9, 1.4, 1.6, 1.8), "width_m")
     length, top = 2.0, rng.between(0.42, 0.52, "top_m")
     x0, x1, y0, y1 = -0.5 * length - 0.06, 0.5 * length + 0.04, -0.5 * w - 0.04, 0.5 * w + 0.04
@@ -244,26 +243,23 @@ def bed(seed: int = 0) -> Solid:
     return parts.solid(patches, looks, [head, mattress])
 
 
-def cushion_pillow(seed: int = 0) -> Solid:
+def cushion_pillow(rng: VariantRng) -> Solid:
     """A cushion that lies flat. Slot: cloth."""
-    rng = variant_rng("cushion_pillow", seed)
     s, h = rng.between(0.19, 0.25), rng.between(0.12, 0.16, "height_m")
     body: parts.Box = ((-0.8 * s, -0.8 * s, 0.0), (0.8 * s, 0.8 * s, h))
     return parts.solid([pillow(s, s, h, rng)], [fabric(rng)], [body])
 
 
-def blanket(seed: int = 0) -> Solid:
+def blanket(rng: VariantRng) -> Solid:
     """A folded blanket. Slot: cloth."""
-    rng = variant_rng("blanket", seed)
     x = 0.5 * rng.between(0.32, 0.44, "depth_m")
     y = 0.5 * rng.between(0.4, 0.6, "width_m")
     layers = rng.whole(2, 5, "layers")
     return _folded(rng, [(x, y, rng.between(0.022, 0.035))] * layers, [fabric(rng)])
 
 
-def towel_stack(seed: int = 0) -> Solid:
+def towel_stack(rng: VariantRng) -> Solid:
     """Folded towels on each other. Slots: cloths."""
-    rng = variant_rng("towel_stack", seed)
     x = 0.5 * rng.between(0.22, 0.3, "depth_m")
     y = 0.5 * rng.between(0.3, 0.4, "width_m")
     count = rng.whole(2, 7, "count")
@@ -271,9 +267,8 @@ def towel_stack(seed: int = 0) -> Solid:
     return _folded(rng, sizes, [parts.cloth(rng), parts.cloth(rng)])
 
 
-def folded_clothes(seed: int = 0) -> Solid:
+def folded_clothes(rng: VariantRng) -> Solid:
     """Folded jumpers and shirts on each other. Slots: cloths."""
-    rng = variant_rng("folded_clothes", seed)
     sizes = [
         (rng.between(0.13, 0.16), rng.between(0.12, 0.16), rng.between(0.025, 0.05))
         for _ in range(rng.whole(1, 6, "count"))
@@ -296,9 +291,8 @@ def _folded(
     return parts.solid(patches, looks, [((-x, -y, 0.0), (x, y, z))])
 
 
-def clothes_pile(seed: int = 0) -> Solid:
+def clothes_pile(rng: VariantRng) -> Solid:
     """Clothes that were dropped. Slots: cloths."""
-    rng = variant_rng("clothes_pile", seed)
     patches: list[Patch] = []
     reach, top = 0.0, 0.0
     for k in range(rng.turn((2, 3), "count")):
@@ -322,9 +316,8 @@ def clothes_pile(seed: int = 0) -> Solid:
     )
 
 
-def laundry_basket(seed: int = 0) -> Solid:
+def laundry_basket(rng: VariantRng) -> Solid:
     """A basket with clothes in it. Slots: basket, clothes."""
-    rng = variant_rng("laundry_basket", seed)
     r, h = rng.between(0.19, 0.24, "radius_m"), rng.between(0.38, 0.55, "height_m")
     wall = shapes.lathe(
         [(0.0, 0.0), (0.85 * r, 0.0), (r, h), (r - 0.012, h), (0.84 * r, 0.02), (0.0, 0.02)], 28
@@ -345,12 +338,11 @@ def laundry_basket(seed: int = 0) -> Solid:
     return parts.solid([wall, heap], looks, [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
 
 
-def coat_hooks(seed: int = 0) -> Solid:
+def coat_hooks(rng: VariantRng) -> Solid:
     """Hooks on a board with coats and a bag; origin at its lowest point, on the wall.
 
     Slots: board, hooks, coats.
     """
-    rng = variant_rng("coat_hooks", seed)
     count = rng.turn((3, 4, 5), "hooks")
     w, drop = 0.17 * count, 1.05
     patches: list[Patch] = [parts.board((0.0, -0.5 * w, drop), (0.02, 0.5 * w, drop + 0.09))]
@@ -449,13 +441,12 @@ def hang_garment(rng: VariantRng, length_m: float, slot: int, *, thin: bool = Fa
     return join_patches(patches)
 
 
-def draped_clothes(seed: int = 0) -> Solid:
+def draped_clothes(rng: VariantRng) -> Solid:
     """A jacket, shirt or blanket over the back of a chair; origin at the back's upper edge.
 
     Slot: cloth.
     """
-    rng = variant_rng("draped_clothes", seed)
-    if seed % 4 == 3:
+    if rng.seed % 4 == 3:
         wide = rng.between(0.34, 0.44, "width_m")
         loop = _over_rail(
             rng, wide, rng.between(0.25, 0.36, "front_m"), rng.between(0.3, 0.5, "back_m"), 0.047
@@ -527,9 +518,8 @@ def _jacket(rng: VariantRng) -> list[Patch]:
     return patches
 
 
-def towel(seed: int = 0) -> Solid:
+def towel(rng: VariantRng) -> Solid:
     """A towel over a rail; origin at the middle below, on the wall. Slots: cloth, rail."""
-    rng = variant_rng("towel", seed)
     w, h = rng.between(0.35, 0.5, "width_m"), rng.between(0.4, 0.65, "height_m")
     rail_x, rail_z, radius = 0.062, h - 0.016, 0.009
     patches = [
@@ -577,9 +567,8 @@ def _over_rail(
     return join_patches([shapes.grid(loop), shapes.grid(sides[0]).flipped(), shapes.grid(sides[1])])
 
 
-def bath_mat(seed: int = 0) -> Solid:
+def bath_mat(rng: VariantRng) -> Solid:
     """A mat of tufted cloth. Slot: pile."""
-    rng = variant_rng("bath_mat", seed)
     x = 0.5 * rng.between(0.44, 0.56, "depth_m")
     y = 0.5 * rng.between(0.64, 0.84, "width_m")
     t = 0.016
@@ -591,9 +580,8 @@ def bath_mat(seed: int = 0) -> Solid:
     )
 
 
-def drying_rack(seed: int = 0) -> Solid:
+def drying_rack(rng: VariantRng) -> Solid:
     """A rack with laundry that dries. Slots: rods, cloths."""
-    rng = variant_rng("drying_rack", seed)
     w, d, h = rng.between(0.95, 1.2, "width_m"), 0.5, rng.between(0.85, 0.95, "height_m")
     patches: list[Patch] = []
     for sy in (-1, 1):

@@ -11,8 +11,10 @@ from gen_data.content.interiors.cartons import carton_looks, tape_carton
 from gen_data.content.interiors.parts import (
     LACQUERS,
     Box,
+    Measures,
     board,
     brushed_steel,
+    drawn,
     front,
     handle,
     lacquer,
@@ -64,32 +66,6 @@ def carcass(
     return made
 
 
-def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, float, int]:
-    """Draws, depth, width, lower and upper edge of the fronts, and number of doors."""
-    rng = variant_rng(family, seed)
-    if family == "wardrobe":
-        return (
-            rng,
-            rng.between(0.55, 0.62, "depth_m"),
-            rng.turn((0.8, 1.0, 1.2), "width_m"),
-            0.08,
-            rng.between(1.9, 2.2, "height_m"),
-            2,
-        )
-    if family == "refrigerator":
-        return (
-            rng,
-            rng.between(0.6, 0.66, "depth_m"),
-            rng.between(0.56, 0.68, "width_m"),
-            0.62,
-            rng.between(1.55, 1.9, "height_m"),
-            1,
-        )
-    if family == "wall_unit":
-        return rng, rng.between(0.32, 0.36, "depth_m"), rng.turn((0.6, 0.8), "width_m"), 0.0, 0.7, 2
-    return rng, 0.58, 0.6, 0.1, 0.86, 1
-
-
 def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
     steel = brushed_steel(seed)
     if family == "refrigerator":
@@ -107,9 +83,13 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
     return [body, body if rng.chance(0.5) else lacquer(rng), steel]
 
 
-def cupboard(family: str, seed: int) -> Solid:
-    """A cupboard without the door that opens. Slots: carcass, front, handle, then worktop."""
-    rng, d, w, low, high, doors = _measures(family, seed)
+def cupboard(family: str, seed: int, measures: Measures) -> Solid:
+    """A cupboard without the door that opens. Slots: carcass, front, handle, then worktop.
+
+    Measures: depth, width, lower and upper edge of the fronts, number of doors.
+    """
+    rng = variant_rng(family, seed)
+    d, w, low, high, doors = drawn(rng, measures).values()
     levels = _levels_m(family, low, high)
     x, half = 0.5 * d, 0.5 * w
     boards = carcass(d, w, low, high)
@@ -167,9 +147,10 @@ def _levels_m(family: str, low_m: float, high_m: float) -> tuple[float, ...]:
     return tuple(low_m + _T + k * (high_m - low_m - _T) / count for k in range(count))
 
 
-def cupboard_door(family: str, seed: int) -> Solid:
+def cupboard_door(family: str, seed: int, measures: Measures) -> Solid:
     """The door that opens of the cupboard of the same seed. Slots: carcass, front, handle."""
-    rng, _, w, low, high, doors = _measures(family, seed)
+    rng = variant_rng(family, seed)
+    _, w, low, high, doors = drawn(rng, measures).values()
     h, width = high - low, w / doors
     thick = 0.045 if family == "refrigerator" else 0.018
     leaf: Box = ((0.0, 0.002, 0.003), (thick, width - 0.002, h - 0.003))
@@ -231,42 +212,6 @@ def _grip(low: float, high: float) -> float:
     return high - 0.14 if high < 1.0 else 1.05
 
 
-def _chest_measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, float, int]:
-    """Draws, depth, width, height, height of the feet, number of drawers."""
-    rng = variant_rng(family, seed)
-    match family:
-        case "dresser":
-            return (
-                rng,
-                rng.between(0.42, 0.5, "depth_m"),
-                rng.between(0.8, 1.3, "width_m"),
-                rng.between(0.74, 1.05, "height_m"),
-                0.09,
-                rng.turn((3, 4), "drawers"),
-            )
-        case "bedside_table":
-            return (
-                rng,
-                rng.between(0.35, 0.42, "depth_m"),
-                rng.between(0.4, 0.5, "width_m"),
-                rng.between(0.42, 0.58, "height_m"),
-                0.1,
-                rng.turn((1, 2), "drawers"),
-            )
-        case "filing_cabinet":
-            drawers = rng.turn((2, 3, 4), "drawers")
-            return rng, 0.58, 0.42, (0.7, 1.02, 1.32)[drawers - 2], 0.02, drawers
-        case _:
-            return (
-                rng,
-                rng.between(0.42, 0.5, "depth_m"),
-                rng.between(0.6, 0.8, "width_m"),
-                rng.between(0.8, 0.95, "height_m"),
-                0.12,
-                5,
-            )
-
-
 def _chest_looks(family: str, rng: VariantRng) -> list[Material]:
     steel = metal_material(STAINLESS, 0.3)
     if family == "filing_cabinet":
@@ -279,9 +224,13 @@ def _chest_looks(family: str, rng: VariantRng) -> list[Material]:
     return [body, body if rng.chance(0.6) else lacquer(rng), steel]
 
 
-def chest(family: str, seed: int) -> Solid:
-    """A chest without its top drawer. Slots: carcass, front, handle."""
-    rng, d, w, z, feet, count = _chest_measures(family, seed)
+def chest(family: str, seed: int, measures: Measures) -> Solid:
+    """A chest without its top drawer. Slots: carcass, front, handle.
+
+    Measures: depth, width, height of the feet, number of drawers, height.
+    """
+    rng = variant_rng(family, seed)
+    d, w, feet, count, z = drawn(rng, measures).values()
     boards = carcass(d, w, feet, z)
     patches = [board(*b) for b in boards]
     x, h = 0.5 * d, (z - feet - _T) / count
@@ -306,9 +255,10 @@ def chest(family: str, seed: int) -> Solid:
     return replace(made, keypoints=(slide,))
 
 
-def drawer(family: str, seed: int) -> Solid:
+def drawer(family: str, seed: int, measures: Measures) -> Solid:
     """The top drawer of the chest of the same seed. Slots: carcass, front, handle."""
-    rng, d, w, z, feet, count = _chest_measures(family, seed)
+    rng = variant_rng(family, seed)
+    d, w, feet, count, z = drawn(rng, measures).values()
     h, depth, half = (z - feet - _T) / count, d - 0.04, 0.5 * w - 0.022
     boxes: list[Box] = [
         ((0.0, -half, 0.002), (0.016, half, h - _T * 0.5 - 0.003)),
@@ -322,18 +272,16 @@ def drawer(family: str, seed: int) -> Solid:
     return solid(patches, _chest_looks(family, rng), boxes)
 
 
-def bookcase(seed: int = 0) -> Solid:
+def bookcase(rng: VariantRng) -> Solid:
     """A bookcase. Slot: boards."""
-    rng = variant_rng("bookcase", seed)
     d = rng.between(0.26, 0.36, "depth_m")
     w = rng.turn((0.4, 0.8, 1.0), "width_m")
     z = rng.between(0.9, 2.05, "height_m")
     return _shelves(d, w, z, [front(rng)])
 
 
-def steel_rack(seed: int = 0) -> Solid:
+def steel_rack(rng: VariantRng) -> Solid:
     """A rack of steel for storage. Slots: boards, posts."""
-    rng = variant_rng("steel_rack", seed)
     d = rng.between(0.4, 0.55, "depth_m")
     w = rng.between(0.9, 1.3, "width_m")
     z = rng.between(1.7, 2.0, "height_m")
@@ -370,9 +318,8 @@ def board_levels_m(height_m: float) -> tuple[float, ...]:
     return shelf_levels_m((1.0, 1.0, height_m), max(1, round((height_m - 0.06) / PITCH_M)))
 
 
-def pallet_rack(seed: int = 0) -> Solid:
+def pallet_rack(rng: VariantRng) -> Solid:
     """A rack for pallets with three levels above the floor. Slots: uprights, beams, decks."""
-    rng = variant_rng("pallet_rack", seed)
     d, w = 1.3, rng.between(2.4, 2.8, "width_m")
     z = 3 * PALLET_PITCH_M + rng.between(0.1, 0.3)
     uprights: list[Box] = []
@@ -408,9 +355,8 @@ PALLET_PITCH_M = 1.5
 """Distance between the levels of racks for pallets."""
 
 
-def pallet(seed: int = 0) -> Solid:
+def pallet(rng: VariantRng) -> Solid:
     """A pallet of 1.2 m by 0.8 m (EN 13698-1), most with boxes. Slots: wood, boxes."""
-    rng = variant_rng("pallet", seed)
     patches: list[Patch] = []
     for y in (-0.3275, 0.0, 0.3275):
         patches.append(board((-0.6, y - 0.05, 0.0), (0.6, y + 0.05, 0.022)))
@@ -422,7 +368,7 @@ def pallet(seed: int = 0) -> Solid:
         y = -0.3275 + k * 0.16375
         patches.append(board((-0.6, y - 0.06, 0.122), (0.6, y + 0.06, 0.144)))
     boxes: list[Box] = [((-0.6, -0.4, 0.0), (0.6, 0.4, 0.144))]
-    goods, looks, high = _goods(seed, rng)
+    goods, looks, high = _goods(rng.seed, rng)
     patches += [patch.moved(0.0, 0.0, 0.144) for patch in goods]
     if high > 0.0:
         boxes.append(((-0.59, -0.39, 0.144), (0.59, 0.39, 0.144 + high)))
@@ -587,29 +533,27 @@ def _mixed(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], flo
     return patches, _in_film(carton_looks(rng, seed)), top
 
 
-def storage_box(seed: int = 0) -> Solid:
+def storage_box(rng: VariantRng) -> Solid:
     """A closed box of cardboard or plastic. Slots: body, lid."""
-    rng = variant_rng("storage_box", seed)
     x = 0.5 * rng.between(0.28, 0.44, "depth_m")
     y = 0.5 * rng.between(0.3, 0.56, "width_m")
     z = rng.between(0.18, 0.4, "height_m")
     low: Box = ((-x, -y, 0.0), (x, y, z - 0.03))
     lid: Box = ((-x - 0.006, -y - 0.006, z - 0.06), (x + 0.006, y + 0.006, z))
     if rng.chance(0.5):
-        looks = [patterned_material(f"texture/cardboard?seed={seed % 16}", 0.5, 0.85)] * 2
+        looks = [patterned_material(f"texture/cardboard?seed={rng.seed % 16}", 0.5, 0.85)] * 2
     else:
         looks = [painted_material(rng.choose((*LACQUERS, "#2f6f9f", "#7a8f5a")), 0.4)] * 2
     whole: Box = (low[0], (x, y, z))
-    if seed % 2:
+    if rng.seed % 2:
         carton: list[Patch] = []
         tape_carton(carton, low[0], (x, y, z), rng, (0, 1, 2, 3))
-        return solid(carton, carton_looks(rng, seed), [whole])
+        return solid(carton, carton_looks(rng, rng.seed), [whole])
     return solid([shapes.block(*low, 0.008), shapes.block(*lid, 0.006, 1)], looks, [whole])
 
 
-def tv_stand(seed: int = 0) -> Solid:
+def tv_stand(rng: VariantRng) -> Solid:
     """A low board for a television. Slots: carcass, front, handle."""
-    rng = variant_rng("tv_stand", seed)
     d = rng.between(0.38, 0.45, "depth_m")
     w = rng.between(1.2, 1.9, "width_m")
     z = rng.between(0.4, 0.55, "height_m")
@@ -626,9 +570,8 @@ def tv_stand(seed: int = 0) -> Solid:
     return solid(patches, [body, body if rng.chance(0.5) else lacquer(rng)], [whole])
 
 
-def washing_machine(seed: int = 0) -> Solid:
+def washing_machine(rng: VariantRng) -> Solid:
     """A washing machine. Slots: body, ring, glass, panel."""
-    rng = variant_rng("washing_machine", seed)
     d, x = rng.between(0.52, 0.6, "depth_m"), 0.0
     x = 0.5 * d
     body: Box = ((-x, -0.3, 0.0), (x, 0.3, 0.85))

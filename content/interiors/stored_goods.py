@@ -25,7 +25,7 @@ from gen_data.content.procedural.material_presets import (
 )
 from gen_data.content.procedural.patches import Patch
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _DARK = painted_material("#1d1e20", 0.5)
 
@@ -90,9 +90,8 @@ def _cup(radius_m: float, height_m: float, slot: int) -> list[Patch]:
     return [_glass(r, h, slot), bow]
 
 
-def crockery(seed: int = 0) -> Solid:
+def crockery(rng: VariantRng) -> Solid:
     """Plates, bowls, cups and glasses in rows, as in cupboards. Slots: glazes, glass."""
-    rng = variant_rng("crockery", seed)
     patches: list[Patch] = []
     y, half = -0.25, 0.25
     common = ["plates", "bowls", "cups", "glasses", "small plates", "cups", "packets"]
@@ -167,9 +166,8 @@ def _boxed(patches: Sequence[Patch], looks: Sequence[Material]) -> Solid:
     return solid([p.moved(float(x), float(y), float(z)) for p in patches], looks, [box])
 
 
-def groceries(seed: int = 0) -> Solid:
+def groceries(rng: VariantRng) -> Solid:
     """Food as it stands in refrigerators: cartons, bottles, jars, bowls and boxes."""
-    rng = variant_rng("groceries", seed)
     group = _Group()
     makers: tuple[Callable[[int], Solid], ...] = (
         packaging.milk_carton, packaging.carton, packaging.carton, bottles.jar, bottles.jar,
@@ -189,9 +187,8 @@ def groceries(seed: int = 0) -> Solid:
     return _boxed(group.patches, group.looks)
 
 
-def hanging_clothes(seed: int = 0) -> Solid:
+def hanging_clothes(rng: VariantRng) -> Solid:
     """Clothes on hangers under a rail 1.2 m high, over folded ones. Slots: cloths, hangers."""
-    rng = variant_rng("hanging_clothes", seed)
     patches: list[Patch] = []
     wide = 0.3
     y = -0.5 * wide + 0.02
@@ -213,29 +210,27 @@ def hanging_clothes(seed: int = 0) -> Solid:
     return _boxed(patches, [*cloths, metal_material(STAINLESS, 0.3)])
 
 
-def carton_stack(seed: int = 0) -> Solid:
+def carton_stack(rng: VariantRng) -> Solid:
     """One to three closed cartons on one another. Slots: card, tape, label, print."""
-    rng = variant_rng("carton_stack", seed)
     patches: list[Patch] = []
     x, y, z = 0.5 * rng.between(0.26, 0.38, "depth_m"), 0.5 * rng.between(0.3, 0.52, "width_m"), 0.0
     for k in range(rng.turn((1, 2, 3), "count")):
-        h = rng.between(0.1, 0.24) if seed % 3 else rng.between(0.14, 0.28)
+        h = rng.between(0.1, 0.24) if rng.seed % 3 else rng.between(0.14, 0.28)
         part: list[Patch] = []
         tape_carton(part, (-x, -y, 0.0), (x, y, h), rng, (0, 1, 2, 3))
         turn = rng.between(-0.06, 0.06) if k else 0.0
         patches += [p.rotated("z", turn).moved(0.0, 0.0, z) for p in part]
         z += h + 0.0007
         x, y = x * rng.between(0.8, 1.0), y * rng.between(0.75, 1.0)
-    return _boxed(patches, carton_looks(rng, seed))
+    return _boxed(patches, carton_looks(rng, rng.seed))
 
 
-def screw_jars(seed: int = 0) -> Solid:
+def screw_jars(rng: VariantRng) -> Solid:
     """Jars with screws and nails, in a row or two. Slots: glass, lids, steel, brass."""
-    rng = variant_rng("screw_jars", seed)
     patches: list[Patch] = []
     r, h = rng.between(0.032, 0.042, "radius_m"), rng.between(0.08, 0.12, "height_m")
     for i in range(rng.turn((1, 2), "rows")):
-        for j in range(2 + seed % 4):
+        for j in range(2 + rng.seed % 4):
             x, y = 2.15 * r * i, 2.15 * r * j
             fill = rng.between(0.25, 0.8) * h
             patches += [
@@ -252,9 +247,8 @@ def screw_jars(seed: int = 0) -> Solid:
     return _boxed(patches, looks)
 
 
-def cable_coil(seed: int = 0) -> Solid:
+def cable_coil(rng: VariantRng) -> Solid:
     """Cable, wire or hose, wound up and lying. Slots: cable, ties."""
-    rng = variant_rng("cable_coil", seed)
     r, wire = rng.between(0.08, 0.15, "radius_m"), rng.between(0.004, 0.008, "wire_m")
     turns = rng.whole(5, 11, "turns")
     t = np.linspace(0.0, 2.0 * math.pi * turns, 22 * turns)
@@ -276,12 +270,11 @@ def cable_coil(seed: int = 0) -> Solid:
     return _boxed(patches, [cable, _DARK])
 
 
-def timber(seed: int = 0) -> Solid:
+def timber(rng: VariantRng) -> Solid:
     """Boards, battens, pipes and a sheet that lean against a wall. Slots: woods, steel, sheet."""
-    rng = variant_rng("timber", seed)
     patches: list[Patch] = []
     y, wide = 0.0, rng.between(0.45, 1.0, "width_m")
-    if seed % 3 == 0:
+    if rng.seed % 3 == 0:
         h = rng.between(1.0, 1.5, "height_m")
         sheet = shapes.block((0.0, 0.0, 0.0), (0.014, wide, h), 0.0015, 3)
         patches.append(sheet.rotated("y", -0.13).moved(0.0, 0.0, 0.0))
@@ -312,9 +305,8 @@ def timber(seed: int = 0) -> Solid:
     return _boxed(placed, looks)
 
 
-def pedal_bin(seed: int = 0) -> Solid:
+def pedal_bin(rng: VariantRng) -> Solid:
     """A bin with a lid and a pedal. Slots: body, dark parts."""
-    rng = variant_rng("pedal_bin", seed)
     r, h = {"tall": (0.13, 0.6), "wide": (0.145, 0.42), "small": (0.1, 0.27)}[
         rng.turn(("tall", "wide", "small"), "size")
     ]
@@ -339,7 +331,7 @@ def pedal_bin(seed: int = 0) -> Solid:
     ]
     shell = (
         metal_material(STAINLESS, 0.28)
-        if seed % 2
+        if rng.seed % 2
         else painted_material(rng.choose(("#f0efeb", "#2b2d30", "#d9d2c3", "#7d8a86")), 0.3)
     )
     return solid(patches, [shell, _DARK], [((-0.9 * r, -0.9 * r, 0.0), (0.9 * r, 0.9 * r, h))])

@@ -32,9 +32,8 @@ def _plastic(rng: VariantRng) -> Material:
     return Material(presets.draw_linear(TOOLS, 0.1, rng), 0.4)
 
 
-def toolbox(seed: int = 0) -> Solid:
+def toolbox(rng: VariantRng) -> Solid:
     """A toolbox with a handle. Slots: body, dark."""
-    rng = variant_rng("toolbox", seed)
     x = 0.5 * rng.between(0.18, 0.24, "depth_m")
     y = 0.5 * rng.between(0.4, 0.54, "width_m")
     h = rng.between(0.17, 0.23, "height_m")
@@ -52,9 +51,8 @@ def toolbox(seed: int = 0) -> Solid:
     return solid(patches, [_plastic(rng), _DARK], [body])
 
 
-def jerry_can(seed: int = 0) -> Solid:
+def jerry_can(rng: VariantRng) -> Solid:
     """A canister with a grip. Slots: body, cap."""
-    rng = variant_rng("jerry_can", seed)
     x, y, h = 0.08, 0.5 * rng.between(0.24, 0.34, "width_m"), rng.between(0.3, 0.42, "height_m")
     patches = [cushion((-x, -y, 0.0), (x, y, 0.82 * h), 0, 0.03)]
     patches.append(rod((0.0, -0.1 * y, h - 0.02), (0.0, 0.75 * y, h - 0.02), 0.016, 0))
@@ -64,9 +62,8 @@ def jerry_can(seed: int = 0) -> Solid:
     return solid(patches, [_plastic(rng), _DARK], [((-x, -y, 0.0), (x, y, h))])
 
 
-def paint_can(seed: int = 0) -> Solid:
+def paint_can(rng: VariantRng) -> Solid:
     """A tin of paint, some open. Slots: tin, paint."""
-    rng = variant_rng("paint_can", seed)
     r, h = rng.between(0.055, 0.1, "radius_m"), rng.between(0.11, 0.2, "height_m")
     inner = h - 0.02 if rng.chance(0.4) else h - 0.004
     wall = [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.008, h), (r - 0.008, inner), (0.0, inner)]
@@ -91,9 +88,8 @@ def crate(seed: int = 0) -> Solid:
     return solid([board(*b) for b in boxes], [wood(rng, 0.8)], boxes)
 
 
-def barrel(seed: int = 0) -> Solid:
+def barrel(rng: VariantRng) -> Solid:
     """A drum of 30 to 200 litres with beads. Slot: body."""
-    rng = variant_rng("barrel", seed)
     r, h = rng.between(0.17, 0.29, "radius_m"), rng.between(0.5, 0.88, "height_m")
     profile = [(0.0, 0.0), (r, 0.0)]
     for share in (0.33, 0.66):
@@ -105,9 +101,8 @@ def barrel(seed: int = 0) -> Solid:
     return solid(patches, [presets.painted_material(paint, 0.4)], [((-r, -r, 0.0), (r, r, h))])
 
 
-def vacuum_cleaner(seed: int = 0) -> Solid:
+def vacuum_cleaner(rng: VariantRng) -> Solid:
     """A vacuum cleaner with its hose and tube. Slots: body, dark, steel."""
-    rng = variant_rng("vacuum_cleaner", seed)
     patches: list[Patch] = [cushion((-0.2, -0.13, 0.03), (0.18, 0.13, 0.23), 0, 0.08)]
     for sy in (-1, 1):
         patches.append(rod((-0.1, sy * 0.12, 0.09), (-0.1, sy * 0.15, 0.09), 0.09, 1, 28))
@@ -124,9 +119,8 @@ def vacuum_cleaner(seed: int = 0) -> Solid:
     return solid(patches, [_plastic(rng), _DARK, _STEEL], boxes)
 
 
-def iron(seed: int = 0) -> Solid:
+def iron(rng: VariantRng) -> Solid:
     """A steam iron. Slots: body, sole."""
-    rng = variant_rng("iron", seed)
     outline = [(0.14, 0.0), (0.06, 0.052), (-0.11, 0.058), (-0.11, -0.058), (0.06, -0.052)]
     points = np.array(outline)
     patches = [
@@ -140,9 +134,8 @@ def iron(seed: int = 0) -> Solid:
     return solid(patches, looks, [((-0.11, -0.058, 0.0), (0.14, 0.058, 0.14))])
 
 
-def globe(seed: int = 0) -> Solid:
+def globe(rng: VariantRng) -> Solid:
     """A globe on a stand. Slots: sea, stand."""
-    rng = variant_rng("globe", seed)
     r = rng.between(0.09, 0.15, "radius_m")
     z = r + 0.07
     ball = shapes.ball(lambda d: r * d, 20, 32).moved(0.0, 0.0, z)
@@ -160,9 +153,8 @@ def globe(seed: int = 0) -> Solid:
     return solid(patches, [sea, wood(rng)], [((-r, -r, 0.0), (r, r, z + r))])
 
 
-def umbrella_stand(seed: int = 0) -> Solid:
+def umbrella_stand(rng: VariantRng) -> Solid:
     """A stand with closed umbrellas. Slots: stand, cloth, grip."""
-    rng = variant_rng("umbrella_stand", seed)
     r, h = rng.between(0.1, 0.13, "radius_m"), rng.between(0.42, 0.55, "height_m")
     wall = [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.005, h), (r - 0.005, 0.01), (0.0, 0.01)]
     patches = [shapes.lathe(wall, 36)]
@@ -174,9 +166,8 @@ def umbrella_stand(seed: int = 0) -> Solid:
     return solid(patches, [_STEEL, _plastic(rng), wood(rng)], [((-r, -r, 0.0), (r, r, h + 0.3))])
 
 
-def hand_truck(seed: int = 0) -> Solid:
+def hand_truck(rng: VariantRng) -> Solid:
     """A hand truck that stands upright. Slots: frame, dark."""
-    rng = variant_rng("hand_truck", seed)
     h, w = rng.between(1.05, 1.25, "height_m"), 0.2
     patches: list[Patch] = [shapes.block((0.0, -w, 0.0), (0.26, w, 0.012), 0.002)]
     for sy in (-1, 1):
@@ -190,9 +181,8 @@ def hand_truck(seed: int = 0) -> Solid:
     return solid(patches, [paint, _DARK], [((-0.2, -w - 0.06, 0.0), (0.26, w + 0.06, h))])
 
 
-def vise(seed: int = 0) -> Solid:
+def vise(rng: VariantRng) -> Solid:
     """A bench vise. Slots: body, steel."""
-    rng = variant_rng("vise", seed)
     boxes: list[Box] = [
         ((-0.09, -0.07, 0.0), (0.05, 0.07, 0.03)),
         ((-0.08, -0.05, 0.03), (0.0, 0.05, 0.15)),
@@ -207,9 +197,8 @@ def vise(seed: int = 0) -> Solid:
     return solid(patches, [paint, _STEEL], boxes)
 
 
-def first_aid_box(seed: int = 0) -> Solid:
+def first_aid_box(rng: VariantRng) -> Solid:
     """A first-aid box. Slots: body, cross."""
-    rng = variant_rng("first_aid_box", seed)
     x, y, h = 0.05, 0.5 * rng.between(0.22, 0.28, "width_m"), rng.between(0.17, 0.22, "height_m")
     z = 0.5 * h
     patches = [

@@ -49,9 +49,8 @@ def wall_art(seed: int) -> TextureData:
     return TextureData(in_turn(_MOTIFS, seed)(w, h, rng))
 
 
-def whiteboard_notes(seed: int) -> TextureData:
+def whiteboard_notes(rng: VariantRng) -> TextureData:
     """Writing with markers on a whiteboard: lists, boxes with arrows, a curve; 512 x 384."""
-    rng = variant_rng("whiteboard_notes", seed)
     image = art.canvas(2 * LONG_PX, 2 * SHORT_PX, (245, 246, 245))
     draw = art.pen(image)
     inks = ((31, 42, 90), (163, 38, 29), (30, 30, 32), (30, 98, 62))

@@ -21,16 +21,15 @@ from gen_data.content.procedural.material_presets import (
 )
 from gen_data.content.procedural.patches import Patch
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 _WHITE = painted_material("#f3f2ee", 0.35)
 _DARK = painted_material("#1d1e20", 0.5)
 SHELF_BRACKET_M = 0.12
 
 
-def wall_shelf(seed: int = 0) -> Solid:
+def wall_shelf(rng: VariantRng) -> Solid:
     """A board on brackets. Slots: board, brackets."""
-    rng = variant_rng("wall_shelf", seed)
     d = rng.between(0.18, 0.26, "depth_m")
     w = rng.between(0.6, 1.2, "width_m")
     t = rng.between(0.02, 0.035, "thickness_m")
@@ -52,9 +51,8 @@ def wall_shelf(seed: int = 0) -> Solid:
     return solid(patches, [front(rng), rng.choose((_DARK, _WHITE))], [shelf])
 
 
-def socket(seed: int = 0) -> Solid:
+def socket(rng: VariantRng) -> Solid:
     """One to three sockets in a frame. Slots: plate, holes."""
-    rng = variant_rng("socket", seed)
     count = rng.turn((1, 2, 3), "count")
     w = 0.081 * count
     plate: Box = ((0.0, -0.5 * w, 0.0), (0.009, 0.5 * w, 0.081))
@@ -88,9 +86,8 @@ def light_switch(seed: int = 0) -> Solid:
     return solid(patches, [_WHITE, painted_material("#f7f6f3", 0.3)], [plate])
 
 
-def utensil_rail(seed: int = 0) -> Solid:
+def utensil_rail(rng: VariantRng) -> Solid:
     """A rail with ladles, spoons and a cloth. Slots: steel, wood, cloth."""
-    rng = variant_rng("utensil_rail", seed)
     w, top = rng.between(0.45, 0.7, "width_m"), 0.36
     patches: list[Patch] = [rod((0.045, -0.5 * w, top), (0.045, 0.5 * w, top), 0.007, 0, 12)]
     for sy in (-1, 1):
@@ -111,9 +108,8 @@ def utensil_rail(seed: int = 0) -> Solid:
     return solid(moved, [metal_material(STAINLESS, 0.25), wood(rng), cloth(rng)], [box])
 
 
-def pegboard(seed: int = 0) -> Solid:
+def pegboard(rng: VariantRng) -> Solid:
     """A board with hand tools on hooks. Slots: board, steel, handles."""
-    rng = variant_rng("pegboard", seed)
     w, h = rng.between(0.9, 1.4, "width_m"), rng.between(0.6, 0.8, "height_m")
     back: Box = ((0.0, -0.5 * w, 0.0), (0.012, 0.5 * w, h))
     patches: list[Patch] = [shapes.block(*back, 0.002)]
@@ -158,9 +154,8 @@ def _hand_tool(y: float, top: float, length: float, kind: int) -> list[Patch]:
     ]
 
 
-def notice_board(seed: int = 0) -> Solid:
+def notice_board(rng: VariantRng) -> Solid:
     """A cork board with sheets of paper. Slots: frame, cork, papers."""
-    rng = variant_rng("notice_board", seed)
     w, h = rng.between(0.6, 1.0, "width_m"), rng.between(0.45, 0.7, "height_m")
     back: Box = ((0.0, -0.5 * w, 0.0), (0.012, 0.5 * w, h))
     patches: list[Patch] = [shapes.block(*back, 0.0, 1)]
@@ -182,17 +177,16 @@ def notice_board(seed: int = 0) -> Solid:
         patches.append(turned.moved(0.0135 + 0.0006 * k, y, z))
     looks = [
         wood(rng),
-        patterned_material(f"texture/cardboard?seed={seed % 16}", 0.15, 0.95),
+        patterned_material(f"texture/cardboard?seed={rng.seed % 16}", 0.15, 0.95),
         painted_material("#f6f5f1", 0.8),
-        printed_material(f"texture/wall_art?seed={13 + 14 * (2 * (seed % 3))}", 0.7),
+        printed_material(f"texture/wall_art?seed={13 + 14 * (2 * (rng.seed % 3))}", 0.7),
         painted_material(rng.choose(("#f2e37a", "#e9a6b2", "#a9d3e8")), 0.8),
     ]
     return solid(patches, looks, [back])
 
 
-def roll_holder(seed: int = 0) -> Solid:
+def roll_holder(rng: VariantRng) -> Solid:
     """A holder with a roll of toilet paper. Slots: steel, paper."""
-    rng = variant_rng("roll_holder", seed)
     r = rng.between(0.04, 0.058, "radius_m")
     roll = shapes.lathe([(0.02, -0.05), (r, -0.05), (r, 0.05), (0.02, 0.05), (0.02, -0.05)], 32, 1)
     tail: Box = ((0.075 + r - 0.002, -0.05, 0.0), (0.075 + r - 0.001, 0.05, 0.1))
@@ -209,9 +203,8 @@ def roll_holder(seed: int = 0) -> Solid:
     )
 
 
-def wall_calendar(seed: int = 0) -> Solid:
+def wall_calendar(rng: VariantRng) -> Solid:
     """A calendar: a picture above a table of days. Slots: paper, picture, ink."""
-    rng = variant_rng("wall_calendar", seed)
     w, h = 0.3, rng.between(0.4, 0.5, "height_m")
     sheet: Box = ((0.0, -0.5 * w, 0.0), (0.004, 0.5 * w, h))
     photo = rectangle((0.0045, -0.46 * w, 0.48 * h), (0.0, 0.92 * w, 0.0), (0.0, 0.0, 0.48 * h))
@@ -223,15 +216,14 @@ def wall_calendar(seed: int = 0) -> Solid:
             patches.append(mark.painted(2))
     looks = [
         painted_material("#f7f6f2", 0.8),
-        printed_material(photograph(seed, upright=False), 0.5),
+        printed_material(photograph(rng.seed, upright=False), 0.5),
         painted_material("#3a3d42", 0.8),
     ]
     return solid(patches, looks, [sheet])
 
 
-def bathroom_cabinet(seed: int = 0) -> Solid:
+def bathroom_cabinet(rng: VariantRng) -> Solid:
     """A cabinet with mirrors for doors. Slots: body, mirror."""
-    rng = variant_rng("bathroom_cabinet", seed)
     w = rng.between(0.55, 0.9, "width_m")
     h = rng.between(0.6, 0.75, "height_m")
     d = 0.14
@@ -246,9 +238,8 @@ def bathroom_cabinet(seed: int = 0) -> Solid:
     return solid(patches, [_WHITE if rng.chance(0.6) else front(rng), silver], [body])
 
 
-def parts_bins(seed: int = 0) -> Solid:
+def parts_bins(rng: VariantRng) -> Solid:
     """Rows of open plastic bins for small parts. Slots: rail, bins, parts."""
-    rng = variant_rng("parts_bins", seed)
     rows, columns = rng.turn((2, 3, 4), "rows"), rng.whole(4, 8, "columns")
     a, h, d = 0.105, 0.085, 0.15
     w, pitch = columns * (a + 0.006), h + 0.045

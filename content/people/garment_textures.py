@@ -46,15 +46,13 @@ _CLOTH = 0.88
 """Grey of smooth plain cloth; valleys of folds are darker, ridges lighter."""
 
 
-def jersey(seed: int) -> TextureData:
+def jersey(rng: VariantRng) -> TextureData:
     """Plain T-shirts and pullovers, softly folded."""
-    rng = variant_rng("jersey", seed)
     return _shaded(_plain(), _top_folds(rng, rng.between(0.7, 1.1)))
 
 
-def jacket_cloth(seed: int) -> TextureData:
+def jacket_cloth(rng: VariantRng) -> TextureData:
     """Jackets and coats: stiff folds, a zip or buttons, pockets, hems, cuffs."""
-    rng = variant_rng("jacket_cloth", seed)
     folds = _top_folds(rng, rng.between(1.0, 1.5))
     pocket_z = rng.between(0.07, 0.13)
     at_pocket = (np.abs(_FROM_FRONT_M - 0.13) < 0.05) & _IS_FRONT
@@ -62,7 +60,7 @@ def jacket_cloth(seed: int) -> TextureData:
     lines = lines + 0.4 * _TRUNK * _line(_Z_M, -0.03, 0.005) + 0.35 * _line(_ASIDE_M, 0.19, 0.004)
     # Sleeves end half a metre below the shoulder; a strip or a seam lies above their hem.
     lines = lines + 0.5 * _LIMB * _line(_ROW_M, SHOULDER_ROW_M + 0.44, 0.004)
-    if seed % 3 == 1:
+    if rng.seed % 3 == 1:
         buttons = _buttons()
         lines = lines + 0.6 * _line(_COLUMN_M - FRONT_M, 0.03, 0.004)
         albedo = _plain() * (1 - 0.5 * np.clip(lines, 0, 1))[..., None]
@@ -71,7 +69,7 @@ def jacket_cloth(seed: int) -> TextureData:
     flap = _line(_FROM_FRONT_M, 0.026, 0.004)
     teeth = _line(_FROM_FRONT_M, 0.0, 0.007)
     notches = 0.5 + 0.5 * np.sin(2.0 * np.pi * _ROW_M / 0.008)
-    lines = lines + 0.8 * teeth + (0.6 * flap if seed % 3 == 2 else 0.0)
+    lines = lines + 0.8 * teeth + (0.6 * flap if rng.seed % 3 == 2 else 0.0)
     albedo = _plain() * (1 - 0.55 * np.clip(lines, 0, 1))[..., None]
     albedo = mix_colors(albedo, color("#9a9a9c"), 0.8 * _line(_FROM_FRONT_M, 0.0, 0.004) * notches)
     return _shaded(albedo, folds - lines + 1.0 * teeth * notches)
@@ -86,9 +84,8 @@ def _buttons() -> Float32:
     )
 
 
-def quilted(seed: int) -> TextureData:
+def quilted(rng: VariantRng) -> TextureData:
     """Down jackets: level chambers with puckered seams."""
-    rng = variant_rng("quilted", seed)
     chamber_m = rng.choose((0.055, 0.075, 0.1))
     wobble = 0.004 * fbm((6, 10), 2, rng)
     across = (_ROW_M + wobble) / chamber_m
@@ -100,11 +97,10 @@ def quilted(seed: int) -> TextureData:
     return _shaded(albedo, (height - zipper).astype(np.float32), 0.09)
 
 
-def denim(seed: int) -> TextureData:
+def denim(rng: VariantRng) -> TextureData:
     """Jeans: pale thighs and knees, whiskers at the hips, twin seams, pockets; some are torn."""
-    rng = variant_rng("denim", seed)
     folds = _leg_folds(rng, 1.1)
-    wash = in_turn((0.0, 0.35, 0.6, 0.85), seed)
+    wash = in_turn((0.0, 0.35, 0.6, 0.85), rng.seed)
     thigh = np.exp(-(((_Z_M + 0.27) / 0.17) ** 2)) * np.exp(-((_TURN / 0.33) ** 2)) * _LIMB
     seat = _TRUNK * (1 - _IS_FRONT) * np.exp(-(((_Z_M - 0.02) / 0.07) ** 2))
     worn = wash * (0.85 * thigh + 0.5 * seat + 0.25 * smoothstep(0.2, 1.6, folds))
@@ -118,24 +114,22 @@ def denim(seed: int) -> TextureData:
     return _shaded(albedo, folds - 0.8 * seams, 0.1)
 
 
-def trouser_cloth(seed: int) -> TextureData:
+def trouser_cloth(rng: VariantRng) -> TextureData:
     """Chinos, or with even seeds suit trousers with a crease."""
-    rng = variant_rng("trouser_cloth", seed)
     folds = _leg_folds(rng, 0.75)
     seams = _LIMB * _line(_TURN * LIMB_WIDTH_M, 0.5 * LIMB_WIDTH_M, 0.004)
     seams = seams + 0.7 * _TRUNK * (_line(_Z_M, 0.105, 0.004) + _pockets())
     crease = _LIMB * (np.exp(-_TURN / 0.03) + np.exp(-(1 - _TURN) / 0.03))
     belt = _TRUNK * _band(_Z_M, 0.1, 0.14)
     albedo = _plain() * (1 - 0.3 * np.clip(seams, 0, 1) - 0.7 * belt)[..., None]
-    height = folds - 0.7 * seams + (2.0 if seed % 2 == 0 else 0.0) * crease
+    height = folds - 0.7 * seams + (2.0 if rng.seed % 2 == 0 else 0.0) * crease
     return _shaded(albedo, height.astype(np.float32))
 
 
-def skirt_cloth(seed: int) -> TextureData:
+def skirt_cloth(rng: VariantRng) -> TextureData:
     """Skirts that hang in long folds; every other one is pleated."""
-    rng = variant_rng("skirt_cloth", seed)
     hang = perlin((2, 30), rng) + 0.5 * perlin((4, 64), rng)
-    if seed % 2:
+    if rng.seed % 2:
         pleat = _COLUMN_M / 0.035
         hang = 1.8 * (pleat - np.floor(pleat)) + 0.3 * hang
     fullness = smoothstep(0.15, -0.25, _Z_M)
@@ -143,24 +137,22 @@ def skirt_cloth(seed: int) -> TextureData:
     return _shaded(_plain(), height)
 
 
-def striped_jersey(seed: int) -> TextureData:
+def striped_jersey(rng: VariantRng) -> TextureData:
     """Level stripes: sailor's shirts, rugby shirts, single bands across the chest."""
-    rng = variant_rng("striped_jersey", seed)
-    ground, ink = _pair("stripes", seed)
+    ground, ink = _pair("stripes", rng.seed)
     period_m = rng.choose((0.022, 0.035, 0.06, 0.1))
     share = rng.choose((0.3, 0.5, 0.5))
     down = np.where(_LIMB > 0, _ROW_M + 0.42, _ROW_M) / period_m
     inked = smoothstep(0.46, 0.54, 0.5 + 0.5 * (share - (down - np.floor(down))) / 0.12)
-    if seed % 4 == 3:
+    if rng.seed % 4 == 3:
         inked = _TRUNK * _band(_Z_M, 0.3, 0.4) + _LIMB * _band(_ROW_M, 0.18, 0.28)
     albedo = mix_colors(_filled(ground), ink, inked.astype(np.float32))
     return _shaded(albedo, _top_folds(rng, rng.between(0.7, 1.1)))
 
 
-def checked_shirt(seed: int) -> TextureData:
+def checked_shirt(rng: VariantRng) -> TextureData:
     """Checks and tartans in two or three colours."""
-    rng = variant_rng("checked_shirt", seed)
-    ground, ink = _pair("checks", seed)
+    ground, ink = _pair("checks", rng.seed)
     period_m = rng.choose((0.02, 0.05, 0.08))
     width = rng.choose((0.5, 0.35))
     upright, level = (
@@ -178,10 +170,9 @@ def checked_shirt(seed: int) -> TextureData:
     return _shaded(albedo, _top_folds(rng, 1.0) - buttons)
 
 
-def patterned_cloth(seed: int) -> TextureData:
+def patterned_cloth(rng: VariantRng) -> TextureData:
     """Dots, flowers and camouflage."""
-    rng = variant_rng("patterned_cloth", seed)
-    ground, ink = _pair("patterns", seed)
+    ground, ink = _pair("patterns", rng.seed)
     cells = rng.choose((14, 24, 36))
     blots = fbm((cells, cells), rng.choose((1, 2)), rng)
     albedo = mix_colors(_filled(ground), ink, smoothstep(0.22, 0.3, blots))
@@ -214,10 +205,9 @@ def hi_vis(seed: int) -> TextureData:
     return _shaded(albedo, _top_folds(rng, 1.1))
 
 
-def hair_strands(seed: int) -> TextureData:
+def hair_strands(rng: VariantRng) -> TextureData:
     """Strands from above to below, in locks, or curls; a light grey. 0.25 m per repeat."""
-    rng = variant_rng("hair_strands", seed)
-    if seed % 2:
+    if rng.seed % 2:
         bend, sway = 9.0 * perlin((9, 9), rng), 9.0 * perlin((9, 9), rng)
         curls = np.abs(warp_image(perlin((26, 26), rng), bend, sway))
         height = (2.6 * curls - 0.6 + 0.5 * perlin((60, 60), rng)).astype(np.float32)
@@ -229,9 +219,8 @@ def hair_strands(seed: int) -> TextureData:
     return texture(_rgb(0.78 + 0.26 * height), None, 1.5 * height)
 
 
-def skin_relief(seed: int) -> TextureData:
+def skin_relief(rng: VariantRng) -> TextureData:
     """Skin: blotches of blood, pores, a few freckles. 0.3 m per repeat."""
-    rng = variant_rng("skin_relief", seed)
     blotches, pores = fbm((6, 6), 4, rng), fbm((70, 70), 2, rng)
     freckles = smoothstep(0.5, 0.8, fbm((60, 60), 1, rng))
     warm = np.array([1.0, 0.965, 0.955], np.float32)

@@ -10,7 +10,7 @@ from gen_data.content.procedural import material_presets, wear
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_centred_solid
 from gen_data.content.procedural.surface_shapes import Point2, UvRect, grid, rounded_box
 from gen_data.core import asset_types, se3
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 COVER_ATLAS: Mapping[str, UvRect] = {
     "back": (0.002, 0.002, 0.438, 0.998), "spine": (0.442, 0.002, 0.558, 0.998),
@@ -28,10 +28,9 @@ def book_size_m(seed: int) -> tuple[float, float, float]:
     return (length * scale, width * scale, rng.between(0.012, 0.042))
 
 
-def book(seed: int) -> Solid:
+def book(rng: VariantRng) -> Solid:
     """A paperback or hardcover. Slots: cover, pages."""
-    rng = variant_rng("book", seed)
-    length, width, thickness = book_size_m(seed)
+    length, width, thickness = book_size_m(rng.seed)
     hard = rng.chance(0.5, "hard")
     board = 0.0028 if hard else 0.0006
     margin = 0.003 if hard else 0.0
@@ -43,8 +42,8 @@ def book(seed: int) -> Solid:
     paper = asset_types.Material(
         material_presets.jitter_color(material_presets.hex_to_linear("#e9e2cf"), 0.05, rng), 0.85
     )
-    rough = wear.dulled(rng.between(0.25, 0.6), wear.draw_wear("book_cover", seed))
-    print_ = material_presets.printed_material(f"texture/book_cover?seed={seed}", rough)
+    rough = wear.dulled(rng.between(0.25, 0.6), wear.draw_wear("book_cover", rng.seed))
+    print_ = material_presets.printed_material(f"texture/book_cover?seed={rng.seed}", rough)
     half = (0.5 * length, 0.5 * width, 0.5 * thickness)
     low = (-half[0], -half[1], -half[2])
     return make_centred_solid([cover, pages], (print_, paper), [hulls.box(low, half)])

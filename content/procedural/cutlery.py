@@ -18,17 +18,16 @@ from gen_data.content.procedural.patches import Array, Patch, join_patches, make
 from gen_data.content.procedural.surface_shapes import fan, grid, spline
 from gen_data.core.asset_types import Material
 from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 Station = tuple[float, float, float, float, float, float]
 """A cross-section [mm]: place along the length (x), reach towards -Y and towards +Y, height of the
 middle of the sheet (z), thickness, and how far the middle lies below the rims."""
 
 
-def spoon(seed: int) -> Solid:
+def spoon(rng: VariantRng) -> Solid:
     """A table, dessert, coffee or serving spoon. Slots: head, handle."""
-    rng = variant_rng("spoon", seed)
-    size = in_turn((1.0, 0.86, 0.66, 1.0, 1.18), seed) * rng.between(0.96, 1.04)
+    size = in_turn((1.0, 0.86, 0.66, 1.0, 1.18), rng.seed) * rng.between(0.96, 1.04)
     wide, tail = rng.between(0.88, 1.1, "wide_scale"), rng.between(0.7, 1.35, "tail_m")
     bowl = [(-32, 3.0, 12.0, 0.5), (-22, 12.0, 9.5, 4.0), (-8, 19.5, 7.0, 7.5),
             (8, 21.0, 6.5, 8.0), (20, 17.5, 7.5, 6.5), (28, 10.5, 9.0, 3.0),
@@ -38,10 +37,9 @@ def spoon(seed: int) -> Solid:
     return _cutlery([_sheet(stations, 40)], size, 36.0, rng)
 
 
-def fork(seed: int) -> Solid:
+def fork(rng: VariantRng) -> Solid:
     """A table or dessert fork with three or four tines. Slots: head, handle."""
-    rng = variant_rng("fork", seed)
-    size = (1.0, 0.86)[seed % 2] * rng.between(0.97, 1.03)
+    size = (1.0, 0.86)[rng.seed % 2] * rng.between(0.97, 1.03)
     tail, half = rng.between(0.7, 1.35, "tail_m"), 0.5 * rng.between(22.0, 27.0, "head_scale")
     count = 3 if rng.chance(0.25) else 4
     head = [(40, 4.0, 4.0, 14.5, 2.2, 0.0), (48, 10.5, 10.5, 12.0, 2.0, 1.0),
@@ -81,10 +79,9 @@ class KnifeStyle:
 KNIVES: Mapping[str, KnifeStyle] = load_table(__package__, "knives", KnifeStyle)
 
 
-def knife(seed: int) -> Solid:
+def knife(rng: VariantRng) -> Solid:
     """A table or kitchen knife lying on its side, edge towards -Y. Slots: blade, handle."""
-    rng = variant_rng("knife", seed)
-    style = KNIVES[knife_kind(seed)]
+    style = KNIVES[knife_kind(rng.seed)]
     size = rng.between(*style.size)
     grip = rng.between(0.9, 1.15, "grip_scale")
     deep = rng.between(0.88, 1.1, "deep_scale")

@@ -22,7 +22,7 @@ from gen_data.content.procedural.material_presets import (
 )
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_centred_solid
 from gen_data.core import asset_types, se3
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _GREYS = ("#1d1d1f", "#26282b", "#3a3c40", "#0f1012")
 _BODIES = ("#1d1d1f", "#26282b", "#e6e6e4", "#c9ccd0", "#2f3f55", "#b8a9c9", "#a9c0b0", "#d9c2b0")
@@ -30,9 +30,8 @@ _BODIES = ("#1d1d1f", "#26282b", "#e6e6e4", "#c9ccd0", "#2f3f55", "#b8a9c9", "#a
 KEY_CELLS = 8
 
 
-def cell_phone(seed: int) -> Solid:
+def cell_phone(rng: VariantRng) -> Solid:
     """A telephone with its screen up. Slots: body, screen, back, lenses, buttons."""
-    rng = variant_rng("cell_phone", seed)
     length, width = rng.between(0.138, 0.166, "length_m"), rng.between(0.067, 0.078, "width_m")
     thick, corner = rng.between(0.0072, 0.0092, "thickness_m"), rng.between(0.005, 0.0125)
     has_case = rng.chance(0.4, "has_case")
@@ -64,7 +63,7 @@ def cell_phone(seed: int) -> Solid:
         back = frame
     materials = (
         frame,
-        _screen_material(seed, rng),
+        _screen_material(rng.seed, rng),
         back,
         asset_types.Material((0.01, 0.01, 0.012), 0.06, printed=True),
         frame,
@@ -114,9 +113,8 @@ def rounded_rectangle(length: float, width: float, radius: float, steps: int = 5
     return np.concatenate(made)
 
 
-def remote(seed: int) -> Solid:
+def remote(rng: VariantRng) -> Solid:
     """A remote control, keys up, its transmitter at +X. Slots: body, keys, others, window."""
-    rng = variant_rng("remote", seed)
     slim = rng.chance(0.35, "slim")
     length = rng.between(0.13, 0.165, "length_m") if slim else rng.between(0.165, 0.225, "length_m")
     width = rng.between(0.034, 0.04, "width_m") if slim else rng.between(0.042, 0.055, "width_m")
@@ -179,9 +177,8 @@ def _remote_keys(
     return keys
 
 
-def mouse(seed: int) -> Solid:
+def mouse(rng: VariantRng) -> Solid:
     """A computer mouse, its keys towards +X. Slots: shell, seams, wheel."""
-    rng = variant_rng("mouse", seed)
     length, width = rng.between(0.096, 0.124, "length_m"), rng.between(0.056, 0.068, "width_m")
     height, flat = rng.between(0.03, 0.041, "height_m"), rng.choose((0.55, 0.7, 0.85), "flat")
     peak, waist = rng.between(-0.25, 0.1), rng.between(0.0, 0.12, "waist_m")
@@ -232,9 +229,8 @@ class _Layout:
     digits: bool
 
 
-def keyboard(seed: int) -> Solid:
+def keyboard(rng: VariantRng) -> Solid:
     """A computer keyboard; its user sits at +X. Slots: case, keys, others."""
-    rng = variant_rng("keyboard", seed)
     layout = _Layout(15, rng.choose((5, 6, 6)), rng.chance(0.5))
     pitch = rng.between(0.0182, 0.0192, "pitch_m")
     columns = layout.columns + (4.4 if layout.digits else 0.0)
@@ -260,7 +256,7 @@ def keyboard(seed: int) -> Solid:
     if rng.chance(0.2):
         body = metal_material(ALUMINIUM, 0.35)
     shade = "dark" if dark else "light"
-    legends = printed_material(f"texture/key_legends?kind={shade}&seed={seed}", 0.5)
+    legends = printed_material(f"texture/key_legends?kind={shade}&seed={rng.seed}", 0.5)
     accent = replace(
         body, metallic=0.0, base_color=draw_linear(PLASTICS if rng.chance(0.2) else codes, 0.1, rng)
     )

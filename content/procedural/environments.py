@@ -13,23 +13,21 @@ from numpy.typing import NDArray
 from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.core import asset_types, colorimetry
 from gen_data.core.noise import fbm, smoothstep, uniform
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 from gen_data.sky.equirectangular import normalize_luminance, pixel_directions
 
 Array = NDArray[np.float64]
 
 
-def neutral(seed: int) -> asset_types.Float32:
+def neutral(rng: VariantRng) -> asset_types.Float32:
     """Grey, a little brighter from above: a light tent."""
-    rng = variant_rng("neutral", seed)
     d = pixel_directions(64)
-    slope = 0.25 if seed == 0 else rng.between(0.0, 0.6)
+    slope = 0.25 if rng.seed == 0 else rng.between(0.0, 0.6)
     return normalize_luminance(np.repeat(1.0 + slope * d[..., 2:], 3, axis=2))
 
 
-def studio(seed: int) -> asset_types.Float32:
+def studio(rng: VariantRng) -> asset_types.Float32:
     """A dim grey room with two to five soft boxes."""
-    rng = variant_rng("studio", seed)
     d = pixel_directions(128)
     image = np.repeat(0.16 + 0.1 * d[..., 2:] + 0.05 * smoothstep(0.0, -0.3, d[..., 2:]), 3, axis=2)
     for _ in range(rng.choose((2, 3, 3, 4, 5))):
@@ -40,9 +38,8 @@ def studio(seed: int) -> asset_types.Float32:
     return normalize_luminance(image)
 
 
-def indoor(seed: int) -> asset_types.Float32:
+def indoor(rng: VariantRng) -> asset_types.Float32:
     """A room with a window, ceiling lamps and a wooden floor, seen from its middle."""
-    rng = variant_rng("indoor", seed)
     d = pixel_directions(128)
     half = np.array([rng.between(2.0, 4.0), rng.between(1.8, 3.5), 1.3])
     reach = half / np.maximum(np.abs(d), 1e-6)
@@ -64,12 +61,11 @@ def indoor(seed: int) -> asset_types.Float32:
     return normalize_luminance(image)
 
 
-def overcast(seed: int) -> asset_types.Float32:
+def overcast(rng: VariantRng) -> asset_types.Float32:
     """A cloud deck over plain ground: three times brighter at the zenith than at the horizon.
 
     Moon and Spencer's overcast sky, CIE S 011/E:2003 type 1 in its traditional form.
     """
-    rng = variant_rng("overcast", seed)
     d = pixel_directions(128)
     up = d[..., 2]
     clouds = 1 + rng.between(0.1, 0.3) * _clouds(d, rng)
@@ -78,9 +74,8 @@ def overcast(seed: int) -> asset_types.Float32:
     return normalize_luminance(_over_ground(sky[..., None] * tint, d, rng))
 
 
-def clear_sky(seed: int) -> asset_types.Float32:
+def clear_sky(rng: VariantRng) -> asset_types.Float32:
     """A blue sky without the sun's disc; add the sun as a light."""
-    rng = variant_rng("clear_sky", seed)
     d = pixel_directions(128)
     sun = _direction(rng.between(-math.pi, math.pi), rng.between(0.5, 1.2))
     light = _perez(d, sun, (-1.0, -0.32, 10.0, -3.0, 0.45))
@@ -95,9 +90,8 @@ def clear_sky(seed: int) -> asset_types.Float32:
     return normalize_luminance(_over_ground(sky, d, rng))
 
 
-def sunset(seed: int) -> asset_types.Float32:
+def sunset(rng: VariantRng) -> asset_types.Float32:
     """A low sun's glow, its disc left out."""
-    rng = variant_rng("sunset", seed)
     d = pixel_directions(128)
     azimuth = rng.between(-math.pi, math.pi)
     sun = _direction(azimuth, rng.between(0.01, 0.12))
@@ -115,9 +109,8 @@ def sunset(seed: int) -> asset_types.Float32:
     return normalize_luminance(_over_ground(sky, d, rng))
 
 
-def night_city(seed: int) -> asset_types.Float32:
+def night_city(rng: VariantRng) -> asset_types.Float32:
     """A dark sky over a skyline of lit windows and street lamps."""
-    rng = variant_rng("night_city", seed)
     d = pixel_directions(128)
     rows, columns = d.shape[:2]
     elevation = np.arcsin(np.clip(d[..., 2], -1, 1))

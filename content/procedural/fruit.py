@@ -240,9 +240,8 @@ def _blade(length: float, width: float, thick: float, droop: float) -> Patch:
     return shapes.ball(shape, 6, 12)
 
 
-def pear(seed: int) -> Solid:
+def pear(rng: VariantRng) -> Solid:
     """A pear standing upright. Slots: skin, stalk."""
-    rng = variant_rng("pear", seed)
     radius, height = rng.between(0.028, 0.037, "radius_m"), rng.between(0.078, 0.108, "height_m")
     neck, lean = rng.between(0.36, 0.6), rng.between(-0.009, 0.009)
     lumps = _lumps(4, 0.05, rng)
@@ -258,7 +257,7 @@ def pear(seed: int) -> Solid:
         up = 0.5 * height * (z + dent)
         return np.stack([r * unit[..., 0] + lean * t**2, r * unit[..., 1], up], axis=2)
 
-    skin = printed_material(f"texture/pear_skin?seed={seed}", rng.between(0.35, 0.5))
+    skin = printed_material(f"texture/pear_skin?seed={rng.seed}", rng.between(0.35, 0.5))
     body = shapes.ball(shape, 24, 28)
     stalk = _stalk(
         (lean, 0.0, 0.5 * height - 0.002), rng.between(0.014, 0.022, "length_m"), 0.0014, rng

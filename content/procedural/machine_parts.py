@@ -37,10 +37,9 @@ from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 _SIZES = load_table(__package__, "metric_parts", tuple[tuple[float, ...], ...])
 
 
-def hex_bolt(seed: int) -> Solid:
+def hex_bolt(rng: VariantRng) -> Solid:
     """A hexagon bolt standing on its head. Slot: body."""
-    rng = variant_rng("hex_bolt", seed)
-    d, flats, head, _, pitch = (0.001 * v for v in in_turn(_SIZES["hexagons"], seed))
+    d, flats, head, _, pitch = (0.001 * v for v in in_turn(_SIZES["hexagons"], rng.seed))
     length = d * rng.choose((2.0, 3.0, 4.0, 5.0), "length_by_diameter")
     threaded = min(length - d, max(2 * d, 0.55 * length))
     corner = flats / math.sqrt(3)
@@ -59,10 +58,9 @@ def hex_bolt(seed: int) -> Solid:
     return make_centred_solid(patches, (_worn_metal("fasteners", rng),), parts, crease_deg=25.0)
 
 
-def nut(seed: int) -> Solid:
+def nut(rng: VariantRng) -> Solid:
     """A hexagon nut. Slot: body."""
-    rng = variant_rng("nut", seed)
-    d, flats, _, height, _ = (0.001 * v for v in in_turn(_SIZES["hexagons"], seed))
+    d, flats, _, height, _ = (0.001 * v for v in in_turn(_SIZES["hexagons"], rng.seed))
     corner = flats / math.sqrt(3)
     body = extrude(circle(corner, 6), height, 0.05 * flats, [circle(0.46 * d, 24)])
     wedges = hulls.ring((0.46 * d, corner, 0.0), (0.46 * d, corner, height), 6)
@@ -72,10 +70,9 @@ def nut(seed: int) -> Solid:
     return make_centred_solid([body], (_worn_metal("fasteners", rng),), turned, crease_deg=25.0)
 
 
-def washer(seed: int) -> Solid:
+def washer(rng: VariantRng) -> Solid:
     """A flat washer. Slot: body."""
-    rng = variant_rng("washer", seed)
-    _, inner, outer, thick = (0.001 * v for v in in_turn(_SIZES["washers"], seed))
+    _, inner, outer, thick = (0.001 * v for v in in_turn(_SIZES["washers"], rng.seed))
     r, big = 0.5 * inner, 0.5 * outer
     seam = (r, 0.5 * thick)
     section = [seam, (r, 0.0), (big, 0.0), (big, thick), (r, thick), seam]
@@ -84,9 +81,8 @@ def washer(seed: int) -> Solid:
     return make_centred_solid([body], (_worn_metal("fasteners", rng),), wedges)
 
 
-def stepped_shaft(seed: int) -> Solid:
+def stepped_shaft(rng: VariantRng) -> Solid:
     """A turned shaft of several diameters, lying along X. Slot: body."""
-    rng = variant_rng("stepped_shaft", seed)
     radii = [rng.between(low, high) for low, high in _SIZES["shaft_radii"]][
         : rng.choose((3, 4, 5), "steps")
     ]
@@ -105,9 +101,8 @@ def stepped_shaft(seed: int) -> Solid:
     return make_centred_solid([body], (_worn_metal("machined", rng),), turned)
 
 
-def pipe_elbow(seed: int) -> Solid:
+def pipe_elbow(rng: VariantRng) -> Solid:
     """A 90 degree pipe elbow with collars, flat on the ground. Slot: body."""
-    rng = variant_rng("pipe_elbow", seed)
     outer = rng.between(0.01, 0.018, "outer_m")
     inner, bend = 0.78 * outer, outer * rng.between(1.5, 2.4)
     straight, collar = 0.8 * outer, outer * 1.22
@@ -139,9 +134,8 @@ def pipe_elbow_symmetries(seed: int) -> tuple[Symmetry, ...]:
     return (Symmetry((-half, half, 0.0), 2),)
 
 
-def bracket(seed: int) -> Solid:
+def bracket(rng: VariantRng) -> Solid:
     """An angle bracket with screw holes. Slot: body."""
-    rng = variant_rng("bracket", seed)
     a, b = rng.between(0.04, 0.07), rng.between(0.03, 0.06)
     width, thick = rng.between(0.02, 0.035, "width_m"), rng.between(0.002, 0.004, "thickness_m")
     hole = min(0.16 * width, 0.004)
@@ -154,9 +148,8 @@ def bracket(seed: int) -> Solid:
     return make_centred_solid([foot, upright], (finish,), parts)
 
 
-def gear(seed: int) -> Solid:
+def gear(rng: VariantRng) -> Solid:
     """A spur gear with hub and bore. Slot: body."""
-    rng = variant_rng("gear", seed)
     shape = _draw_gear(rng)
     teeth, module, thick, hub = shape.teeth, shape.module_m, shape.thick_m, shape.hub_m
     pitch, bore = 0.5 * teeth * module, shape.bore_m
@@ -200,9 +193,8 @@ def _draw_gear(rng: VariantRng) -> _Gear:
     return _Gear(teeth, module, thick, bore, hub)
 
 
-def flange(seed: int) -> Solid:
+def flange(rng: VariantRng) -> Solid:
     """A pipe flange with bolt holes and a neck. Slot: body."""
-    rng = variant_rng("flange", seed)
     radius, thick, count = _draw_flange(rng)
     bore = 0.42 * radius
     bolt, at = 0.1 * radius, 0.76 * radius
@@ -233,9 +225,8 @@ def _draw_flange(rng: VariantRng) -> tuple[float, float, int]:
     return radius, thick, rng.choose((4, 4, 6, 8))
 
 
-def connector(seed: int) -> Solid:
+def connector(rng: VariantRng) -> Solid:
     """A block with round ports on three to six sides. Slots: body, ports."""
-    rng = variant_rng("connector", seed)
     side, reach, ports = _draw_connector(rng)
     port = 0.32 * side
     body = rounded_box((side, side, side), 0.06 * side, 2)

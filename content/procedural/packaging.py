@@ -13,7 +13,7 @@ from gen_data.content.procedural import material_presets, surface_shapes, vessel
 from gen_data.content.procedural.patches import Patch, join_patches, make_centred_solid, rotate
 from gen_data.content.procedural.wear import draw_wear, dulled
 from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 _SIZES = load_table(__package__, "package_sizes", tuple[tuple[float, ...], ...])
 
@@ -39,12 +39,11 @@ def label_aspect(seed: int) -> float:
     return 2 * math.pi * size.radius_m / (size.height_m * (0.9 if size.food else 0.8))
 
 
-def can(seed: int) -> Solid:
+def can(rng: VariantRng) -> Solid:
     """A drink can or food can. Slots: print, metal, tab."""
-    rng = variant_rng("can", seed)
-    size = can_size(seed)
+    size = can_size(rng.seed)
     r, h = size.radius_m, size.height_m
-    texture, wear = f"texture/can_label?seed={seed}", draw_wear("can_label", seed)
+    texture, wear = f"texture/can_label?seed={rng.seed}", draw_wear("can_label", rng.seed)
     if size.food:
         print_ = material_presets.printed_material(texture, dulled(rng.between(0.5, 0.7), wear))
         patches, stages = _food_can(r, h)

@@ -9,21 +9,20 @@ from gen_data.content.procedural import surface_shapes as shapes
 from gen_data.content.procedural.food_shapes import food_material, plain_food, turned, wobble, wrap
 from gen_data.content.procedural.material_presets import printed_material
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_centred_solid, unit
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 # Steps in which berries push each other apart; overlaps are then below a tenth of a berry.
 _RELAXATIONS = 28
 _TWIG = ("#7a7a3a", "#6b5a34", "#8a8a4a")
 
 
-def grapes(seed: int) -> Solid:
+def grapes(rng: VariantRng) -> Solid:
     """A bunch of 30 to 80 grapes lying along X, its stalk towards +X. Slots: skins, stalk.
 
     Berries are 15 mm to 23 mm thick, bunches 0.1 m to 0.19 m long (assumed, within 10 % of what
     shops sell).
     """
-    rng = variant_rng("grapes", seed)
-    count = grape_count(seed)
+    count = grape_count(rng.seed)
     thick = rng.between(0.0075, 0.0115, "berry_radius_m")
     slim = rng.choose((1.0, 1.05, 1.15, 1.35), "slim")
     places = _packed(count, thick, rng)
@@ -42,7 +41,7 @@ def grapes(seed: int) -> Solid:
     # Skins of one kind: textures take their grounds in turn by seed, and there are four.
     skins = [
         printed_material(
-            f"texture/fruit_skin?kind=grape&seed={seed + 40 * k}", rng.between(0.25, 0.4)
+            f"texture/fruit_skin?kind=grape&seed={rng.seed + 40 * k}", rng.between(0.25, 0.4)
         )
         for k in range(3)
     ]
@@ -115,13 +114,12 @@ def _stalk(places: Array, rng: VariantRng) -> tuple[Patch, list[Patch]]:
     return main, twigs
 
 
-def broccoli(seed: int) -> Solid:
+def broccoli(rng: VariantRng) -> Solid:
     """A head or a floret of broccoli standing on its stalk. Slots: florets, stalk.
 
     Heads are 0.09 m to 0.15 m wide, florets 0.04 m to 0.07 m (assumed, within 15 %).
     """
-    rng = variant_rng("broccoli", seed)
-    is_head = broccoli_kind(seed) == "head"
+    is_head = broccoli_kind(rng.seed) == "head"
     radius = (
         rng.between(0.045, 0.07, "radius_m") if is_head else rng.between(0.02, 0.034, "radius_m")
     )
@@ -168,7 +166,7 @@ def broccoli(seed: int) -> Solid:
     crown = join_patches(florets).painted(0)
     stalk = join_patches([trunk, *arms]).painted(1)
     materials = [
-        food_material("broccoli", seed, 0.75, 0.05),
+        food_material("broccoli", rng.seed, 0.75, 0.05),
         plain_food(("#9fb56a", "#b5c484", "#8fa85a"), 0.55, rng),
     ]
     points = crown.corners_m.reshape(-1, 3)
@@ -208,12 +206,11 @@ def _floret(size: float, way: Array, rng: VariantRng) -> Patch:
     return turned(cluster, axis, math.acos(max(-1.0, min(1.0, float(unit(way[None])[0, 2])))))
 
 
-def mushroom(seed: int) -> Solid:
+def mushroom(rng: VariantRng) -> Solid:
     """A button mushroom standing on its stalk. Slots: cap, gills, stalk.
 
     Caps are 30 mm to 65 mm wide (UNECE FFV-24: from 15 mm; above, assumed).
     """
-    rng = variant_rng("mushroom", seed)
     radius = rng.between(0.015, 0.032, "radius_m")
     high, stem = radius * rng.between(0.8, 1.15), radius * rng.between(0.5, 0.9)
     foot = radius * rng.between(0.34, 0.46)
@@ -251,11 +248,11 @@ def mushroom(seed: int) -> Solid:
         angle = np.where(away > 1e-6, np.arctan2(corners[..., 1], corners[..., 0]), 0.0)
         corners[..., :2] *= outline(angle)[..., None]
         warped.append(Patch(corners, patch.uvs, patch.slots))
-    tone = food_material("mushroom", seed, 0.6, 0.06)
+    tone = food_material("mushroom", rng.seed, 0.6, 0.06)
     pale = plain_food(("#efe6d6", "#e6dac4"), 0.7, rng)
     lean = rng.between(0.0, 0.06, "lean_rad")
     parts = [wrap(warped[0].corners_m), wrap(patches[2].corners_m, 24)]
-    if seed % 2:
+    if rng.seed % 2:
         # Picked ones lie on their side as often as they stand.
         turn = 0.5 * math.pi + lean
         warped = [p.rotated("y", turn) for p in warped]

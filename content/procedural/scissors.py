@@ -10,14 +10,13 @@ from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural import surface_shapes as shapes
 from gen_data.content.procedural.material_presets import STAINLESS, metal_material, plastic_material
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_centred_solid
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _PLASTICS = ("#e0641a", "#1d1d1f", "#1d1d1f", "#c3121f", "#1f6fb5", "#2e8a4e", "#6a6f73", "#d14f78")
 
 
-def scissors(seed: int) -> Solid:
+def scissors(rng: VariantRng) -> Solid:
     """A pair of scissors, shut or open. Slots: blades, handles, screw."""
-    rng = variant_rng("scissors", seed)
     # Nail to tailor's scissors: 110 to 240 mm (assumed, within 10 %).
     size = rng.choose((0.55, 0.75, 0.9, 1.0, 1.0, 1.15)) * rng.between(0.95, 1.05)
     spread = rng.choose((0.0, 0.0, 0.05, 0.25, 0.45)) * rng.between(0.7, 1.2)

@@ -22,9 +22,8 @@ from gen_data.core.variant_rng import VariantRng, variant_rng
 _LAID = 0.5 * math.pi
 
 
-def screwdriver(seed: int) -> Solid:
+def screwdriver(rng: VariantRng) -> Solid:
     """A screwdriver with a fluted handle, slotted or pointed tip. Slots: handle, steel, ring."""
-    rng = variant_rng("screwdriver", seed)
     shape = _draw_screwdriver(rng)
     radius, grip, blade, shaft = shape.radius_m, shape.grip_m, shape.blade_m, shape.shaft_m
     handle = _fluted_handle(radius, grip, shape.flutes)
@@ -76,9 +75,8 @@ def _draw_screwdriver(rng: VariantRng) -> _Screwdriver:
     )
 
 
-def hammer(seed: int) -> Solid:
+def hammer(rng: VariantRng) -> Solid:
     """A joiner's hammer with wooden or plastic handle. Slots: handle, head."""
-    rng = variant_rng("hammer", seed)
     length, size = rng.between(0.26, 0.33, "length_m"), rng.between(0.9, 1.1, "size_scale")
     handle = _hammer_handle(length)
     head, head_hulls = _hammer_head()
@@ -93,9 +91,8 @@ def hammer(seed: int) -> Solid:
     return make_centred_solid([handle, head], (grip, steel), parts)
 
 
-def wrench(seed: int) -> Solid:
+def wrench(rng: VariantRng) -> Solid:
     """A combination wrench: open jaw at +X, ring at -X. Slot: steel."""
-    rng = variant_rng("wrench", seed)
     across = rng.choose((0.010, 0.012, 0.013, 0.015, 0.017, 0.019), "across_flats_m")
     length = across * rng.between(10.5, 12.5)
     thick, bar = 0.33 * across + 0.0012, 0.36 * across + 0.0015

@@ -7,7 +7,7 @@ from gen_data.content.procedural.patches import make_centred_solid, make_solid_i
 from gen_data.content.procedural.surface_shapes import ball as sphere
 from gen_data.content.procedural.surface_shapes import fillet, lathe, rounded_box
 from gen_data.core.asset_types import Material, Symmetry
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 _SHAPES = ((0.04, 0.04, 0.04), (0.03, 0.06, 0.03), (0.03, 0.09, 0.03), (0.05, 0.05, 0.025),
            (0.06, 0.06, 0.03), (0.025, 0.075, 0.015))  # fmt: skip
@@ -26,15 +26,14 @@ def block(seed: int) -> Solid:
     return make_centred_solid([body], (paint,), [hull])
 
 
-def ball(seed: int) -> Solid:
+def ball(rng: VariantRng) -> Solid:
     """A tennis, rubber, beach, basket or foot ball; the small ones are toys. Slot: cover."""
-    rng = variant_rng("ball", seed)
-    kind = ball_kind(seed)
+    kind = ball_kind(rng.seed)
     small, large = rng.between(0.02, 0.035), rng.between(0.05, 0.09)
     radius = {"tennis": 0.0334, "rubber": small}.get(kind, large)
     rough = {"tennis": 0.9, "basket": 0.65}.get(kind, rng.between(0.3, 0.5))
     body = sphere(lambda d: radius * d, 22, 36)
-    cover = presets.printed_material(f"texture/ball_cover?seed={seed}", rough)
+    cover = presets.printed_material(f"texture/ball_cover?seed={rng.seed}", rough)
     # A single small hull has flat sides that a ball would rest on; four rotated ones roll.
     parts = [hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)]
     return make_centred_solid([body], (cover,), parts)
@@ -65,9 +64,8 @@ def ball_kind(seed: int) -> str:
     return ("tennis", "rubber", "beach", "basket", "foot")[seed % 5]
 
 
-def candle(seed: int) -> Solid:
+def candle(rng: VariantRng) -> Solid:
     """A pillar candle with a wick. Slots: wax, wick."""
-    rng = variant_rng("candle", seed)
     radius, height = rng.between(0.022, 0.04, "radius_m"), rng.between(0.05, 0.15, "height_m")
     rim = [(radius, height), (0.75 * radius, height - 0.003), (0.0, height - 0.006)]
     wax = fillet([(0.0, 0.0), (radius, 0.0), *rim], [0.0, 0.002, 0.003, 0.004, 0.0], 3)

@@ -7,21 +7,20 @@ import numpy as np
 from gen_data.content.procedural.textures.texture_images import color, mix_colors, texture
 from gen_data.core.asset_types import Float32, TextureData
 from gen_data.core.noise import blur_image, fbm, rows_and_columns, smoothstep, uniform
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 _PX = 256
 
 
-def manhole(seed: int) -> TextureData:
+def manhole(rng: VariantRng) -> TextureData:
     """A round cover in its frame: studded iron, a ring filled with concrete, or ribs with vents.
 
     Args:
-        seed: Seeds take the three kinds in turn.
+        rng: Draws; seeds take the three kinds in turn.
     """
-    rng = variant_rng("manhole", seed)
     y, x = (2.0 * v - 1.0 for v in rows_and_columns(_PX))
     radius, turn = np.sqrt(x * x + y * y), np.arctan2(y, x)
-    kind = in_turn(("studs", "concrete", "ribs"), seed)
+    kind = in_turn(("studs", "concrete", "ribs"), rng.seed)
     inner = smoothstep(0.74, 0.7, radius)
     rings = _line(radius, 0.77, 0.02) + _line(radius, 0.93, 0.04)
     gap = _line(radius, 0.84, 0.015)
@@ -48,19 +47,18 @@ def manhole(seed: int) -> TextureData:
     return texture(albedo, roughness, blur_image((3.0 * raised - 4.0 * open_).astype(np.float32)))
 
 
-def hatch(seed: int) -> TextureData:
+def hatch(rng: VariantRng) -> TextureData:
     """A rectangular cover of cables or valves: chequered plates, or iron with a concrete field.
 
     Args:
-        seed: Seeds take the two kinds in turn.
+        rng: Draws; seeds take the two kinds in turn.
     """
-    rng = variant_rng("hatch", seed)
     y, x = rows_and_columns(_PX)
     side = np.minimum(np.minimum(x, 1.0 - x), np.minimum(y, 1.0 - y))
     gap = _line(side, 0.07, 0.012) + _line(x, 0.5, 0.008) * smoothstep(0.07, 0.08, side)
     inside = smoothstep(0.1, 0.12, side)
     grit = fbm((20, 20), 4, rng, 0.7, _PX)
-    if in_turn(("plates", "concrete"), seed) == "plates":
+    if in_turn(("plates", "concrete"), rng.seed) == "plates":
         raised = smoothstep(0.3, 0.6, np.sin(44.0 * (x + y)) * np.sin(44.0 * (x - y))) * inside
         albedo = _iron(raised, grit, np.clip(gap, 0.0, 1.0))
     else:
@@ -72,20 +70,19 @@ def hatch(seed: int) -> TextureData:
     return texture(albedo, None, blur_image((2.0 * raised - 4.0 * gap).astype(np.float32)))
 
 
-def drain(seed: int) -> TextureData:
+def drain(rng: VariantRng) -> TextureData:
     """A grating of a street gully; slots run across the gutter, or it is a grid.
 
     Args:
-        seed: Seeds take the two kinds in turn.
+        rng: Draws; seeds take the two kinds in turn.
     """
-    rng = variant_rng("drain", seed)
     y, x = rows_and_columns(_PX)
     inside = (
         smoothstep(0.07, 0.09, x) * smoothstep(0.93, 0.91, x)
         * smoothstep(0.08, 0.1, y) * smoothstep(0.92, 0.9, y)
     )  # fmt: skip
     slots = smoothstep(0.1, 0.35, np.sin(2.0 * math.pi * 7.0 * x)) * inside
-    if in_turn(("slots", "grid"), seed) == "slots":
+    if in_turn(("slots", "grid"), rng.seed) == "slots":
         slots = slots * smoothstep(0.03, 0.05, np.abs(y - 0.5))
     else:
         slots = slots * smoothstep(-0.5, -0.1, np.sin(2.0 * math.pi * 5.0 * y))

@@ -164,22 +164,21 @@ def track_lane(seed: int, material: str = "earth") -> TextureData:
     return _narrow(albedo, None, height.astype(np.float32))
 
 
-def gutter(seed: int, age_years: float = 6.0) -> TextureData:
+def gutter(rng: VariantRng, age_years: float = 6.0) -> TextureData:
     """The edge of a carriageway: clean asphalt at both sides of the image, the kerb in its middle.
 
     Grit, sand and a few leaves that wind and water leave there; 3 m per repeat along the kerb,
     0.5 m from it to clean asphalt.
 
     Args:
-        seed: Of everything drawn, and of the stone.
+        rng: All that is drawn, also the stone.
         age_years: Of the asphalt below.
     """
-    rng = variant_rng("gutter", seed)
     n = 512
     x = 1.0 - np.abs(2.0 * rows_and_columns(n)[1] - 1.0)
     grain = (uniform((n, n), rng) - 0.5).astype(np.float32)
     shade = 1.0 + 0.3 * grain + 0.05 * fbm((10, 6), 4, rng, 0.6, n)
-    albedo = (asphalt_color(seed, age_years) * shade[..., None]).astype(np.float32)
+    albedo = (asphalt_color(rng.seed, age_years) * shade[..., None]).astype(np.float32)
     drift = fbm((9, 4), 5, rng, 0.6, n)
     # Nothing at the inner edge, where the lane's own surface goes on.
     cover = smoothstep(0.25, 0.95, x + 0.28 * drift) * smoothstep(0.0, 0.3, x)

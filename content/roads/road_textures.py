@@ -14,21 +14,20 @@ from gen_data.content.procedural.textures.texture_images import (
 from gen_data.content.roads.lane_textures import asphalt_color
 from gen_data.core.asset_types import Float32, TextureData
 from gen_data.core.noise import blur_image, fbm, rows_and_columns, smoothstep, uniform, worley
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 GROUND_PX = 1024
 _N = GROUND_PX
 
 
-def asphalt(seed: int, wear: float = 0.3, age_years: float = 6.0) -> TextureData:
+def asphalt(rng: VariantRng, wear: float = 0.3, age_years: float = 6.0) -> TextureData:
     """Dense asphalt: stones of up to 11 mm in bitumen, which wears off them; 6 m per repeat.
 
     Args:
-        seed: Of everything drawn, and of the stone.
+        rng: All that is drawn, also the stone.
         wear: 0 even; 1 stony and stained.
         age_years: Since it was laid: from dark to grey.
     """
-    rng = variant_rng("asphalt", seed)
     stones = worley((340, 340), rng, size_px=_N)
     tone = stones.of_each(uniform(stones.count, rng) - 0.5)
     grain = (uniform((_N, _N), rng) - 0.5).astype(np.float32)
@@ -36,14 +35,13 @@ def asphalt(seed: int, wear: float = 0.3, age_years: float = 6.0) -> TextureData
     shade = 1.0 + (0.24 + 0.3 * wear) * tone + 0.26 * grain + (0.03 + 0.035 * wear) * clouds
     oil = smoothstep(0.45, 1.1, fbm((9, 9), 4, rng, 0.6, _N)) * np.float32(0.1 * wear)
     pale = smoothstep(0.4, 1.0, fbm((7, 7), 4, rng, 0.6, _N)) * np.float32(0.07 * wear)
-    albedo = asphalt_color(seed, age_years) * (shade * (1.0 - oil + pale))[..., None]
+    albedo = asphalt_color(rng.seed, age_years) * (shade * (1.0 - oil + pale))[..., None]
     height = 0.35 * tone + 0.35 * blur_image(grain)
     return texture(albedo.astype(np.float32), 0.97 - 0.5 * oil, height.astype(np.float32), 0.8)
 
 
-def paving(seed: int) -> TextureData:
+def paving(rng: VariantRng) -> TextureData:
     """Concrete slabs or blocks in straight or running bond; 3 m per repeat."""
-    rng = variant_rng("paving", seed)
     rows, columns, shift = rng.choose(((10, 10, 0.0), (10, 5, 0.5), (15, 15, 0.5), (6, 6, 0.0)))
     edge, number = _bond(rows, columns, shift)
     joint = rng.between(1.2, 2.2)
@@ -60,9 +58,8 @@ def paving(seed: int) -> TextureData:
                    0.98 - 0.06 * face, blur_image(height).astype(np.float32))  # fmt: skip
 
 
-def cobbles(seed: int) -> TextureData:
+def cobbles(rng: VariantRng) -> TextureData:
     """Small sett paving in rows; 2.4 m per repeat."""
-    rng = variant_rng("cobbles", seed)
     rows = rng.choose((24, 26))
     points = worley((rows, rows), rng, jitter=0.38, size_px=_N)
     gap = points.second - points.nearest
@@ -77,9 +74,8 @@ def cobbles(seed: int) -> TextureData:
                    0.95 - 0.15 * face, blur_image(height, 2).astype(np.float32))  # fmt: skip
 
 
-def grass(seed: int) -> TextureData:
+def grass(rng: VariantRng) -> TextureData:
     """A mown lawn from above: green, straw and bare earth in patches; 5 m per repeat."""
-    rng = variant_rng("grass", seed)
     green, deep, straw = color("#717a48"), color("#566034"), color("#9a9064")
     patches = fbm((7, 7), 6, rng, 0.62, _N)
     albedo = mix_colors(green, deep, smoothstep(-0.5, 0.8, patches))
@@ -100,9 +96,8 @@ def grass(seed: int) -> TextureData:
                    (1.1 * blades + speck).astype(np.float32), 0.8)  # fmt: skip
 
 
-def gravel(seed: int) -> TextureData:
+def gravel(rng: VariantRng) -> TextureData:
     """Crushed stone of two sizes; 3 m per repeat."""
-    rng = variant_rng("gravel", seed)
     base = draw_color(("#8d8578", "#7c7a76", "#998d7a"), 0.05, rng)
     albedo = np.broadcast_to(base * np.float32(0.7), (_N, _N, 3)).astype(np.float32)
     height = np.zeros((_N, _N), dtype=np.float32)
@@ -117,9 +112,8 @@ def gravel(seed: int) -> TextureData:
     return texture((albedo * clouds[..., None]).astype(np.float32), None, blur_image(height))
 
 
-def earth(seed: int) -> TextureData:
+def earth(rng: VariantRng) -> TextureData:
     """Bare soil with pebbles and dry grass; 5 m per repeat."""
-    rng = variant_rng("earth", seed)
     base = draw_color(("#7a6650", "#6e5b47", "#86745c"), 0.05, rng)
     clouds = fbm((6, 6), 7, rng, 0.65, _N)
     pebbles = worley((120, 120), rng, size_px=_N)
@@ -133,21 +127,20 @@ def earth(seed: int) -> TextureData:
     return texture(albedo, None, (1.5 * clouds + 2.0 * stone + speck).astype(np.float32), 0.8)
 
 
-def road_paint(seed: int, wear: float = 0.3, age_years: float = 6.0) -> TextureData:
+def road_paint(rng: VariantRng, wear: float = 0.3, age_years: float = 6.0) -> TextureData:
     """White marking: glass beads in paint, dirtied and worn down to the road; 2 m per repeat.
 
     Args:
-        seed: Of everything drawn, and of the stone of the asphalt below.
+        rng: All that is drawn, also the stone of the asphalt below.
         wear: 0 fresh to 1 hardly visible in places; 1.6: only traces.
         age_years: Of the asphalt below.
     """
-    rng = variant_rng("road_paint", seed)
     grain = (uniform((512, 512), rng) - 0.5).astype(np.float32)
     dirt = smoothstep(-0.6, 1.0, fbm((6, 6), 5, rng, 0.6)) * np.float32(
         min(0.08 + 0.16 * wear, 0.3)
     )
     paint = color("#d6d5cf") * (1.0 - dirt + 0.05 * grain)[..., None]
-    bare = asphalt_color(seed, age_years) * (1.03 + 0.35 * grain)[..., None]
+    bare = asphalt_color(rng.seed, age_years) * (1.03 + 0.35 * grain)[..., None]
     flaking = fbm((14, 14), 6, rng, 0.7) + 0.9 * grain
     limit = 1.75 - 1.5 * wear
     gone = smoothstep(limit, limit + 0.25, flaking)

@@ -28,19 +28,18 @@ from gen_data.content.scenery.clutter_shapes import (
     worn_steel,
 )
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 PRAMS = ("carrycot", "buggy", "carrycot", "buggy")
 SUITCASES = ("hard", "soft", "duffel", "hard", "backpack")
 _FABRICS = ("#23262b", "#2f3e5c", "#5d6b70", "#7a2f3a", "#3f5b45", "#9a8f7d", "#b9b4aa", "#c2743a")
 
 
-def pram(seed: int) -> Solid:
+def pram(rng: VariantRng) -> Solid:
     """A pram or buggy without a child, pushed towards +X by a handle at -X.
 
     Slots: frame, fabric, tyre, trim.
     """
-    rng = variant_rng("pram", seed)
     kind = rng.turn(PRAMS, "kind")
     r, wide = (0.14, 0.27) if kind == "carrycot" else (0.1, 0.23)
     front, rear, grip = 0.36, -0.34, rng.between(0.98, 1.06, "grip_scale")
@@ -104,12 +103,11 @@ def _hood(z: float, arc: tuple[float, float], y: float, span_rad: float) -> Patc
     return join_patches([outer.flipped(), outer.moved(z=-0.012)])
 
 
-def suitcase(seed: int) -> Solid:
+def suitcase(rng: VariantRng) -> Solid:
     """Luggage that stands on the ground: a trolley case, a holdall or a backpack.
 
     Slots: shell, trim, wheels, second fabric.
     """
-    rng = variant_rng("suitcase", seed)
     kind = rng.turn(SUITCASES, "kind")
     if kind in {"hard", "soft"}:
         parts, high = _trolley(kind == "hard", rng)
@@ -201,12 +199,11 @@ def _backpack(rng: VariantRng) -> tuple[list[Patch], float]:
     return parts, high
 
 
-def shopping_bags(seed: int) -> Solid:
+def shopping_bags(rng: VariantRng) -> Solid:
     """One to four bags side by side: printed paper with cord handles, carrier bags, a full tote.
 
     Slots: first and second paper, print, cords, goods.
     """
-    rng = variant_rng("shopping_bags", seed)
     count = rng.turn((1, 2, 3, 4), "count")
     parts, at = [], 0.0
     for k in range(count):
@@ -223,7 +220,7 @@ def shopping_bags(seed: int) -> Solid:
     materials = (
         rng.choose((plain, Material(draw_linear(colors, 0.05, rng), 0.7))),
         Material(draw_linear(colors, 0.05, rng), 0.5),
-        printed_material(f"texture/poster?seed={seed % 12}", 0.5),
+        printed_material(f"texture/poster?seed={rng.seed % 12}", 0.5),
         painted_material(rng.choose(("#1a1b1d", "#c9b48a")), 0.8),
         painted_material(rng.choose(("#3f6a2f", "#d9a05a", "#b8261e")), 0.6),
     )

@@ -115,13 +115,12 @@ def _crockery(high: float, half: float, count: int, rng: VariantRng) -> list[Pat
     return parts
 
 
-def parasol(seed: int) -> Solid:
+def parasol(rng: VariantRng) -> Solid:
     """A parasol of 2.5 to 4 m, square or round, open or (every fourth) furled.
 
     Slots: steel, pole, base, -, canvas, stripes.
     """
-    rng = variant_rng("parasol", seed)
-    furled, half = _is_furled(seed), 0.5 * rng.between(2.5, 4.0, "width_m")
+    furled, half = _is_furled(rng.seed), 0.5 * rng.between(2.5, 4.0, "width_m")
     parts = [block((-0.35, -0.35, 0.0), (0.35, 0.35, 0.08), 0.015, 2)]
     parts.append(post(0.028, (0.08, 2.75)).painted(1))
     if furled:
@@ -134,7 +133,7 @@ def parasol(seed: int) -> Solid:
             rows.append(ring)
         parts.append(grid(np.stack(rows), slot=_SLOT_CANVAS))
     else:
-        parts += _canopy(half, 4 if seed % 2 else 8, rng.chance(0.4, "striped"))
+        parts += _canopy(half, 4 if rng.seed % 2 else 8, rng.chance(0.4, "striped"))
     wood = presets.patterned_material("texture/wood_grain?seed=2", 1.0, 0.6, (0.6, 0.45, 0.32))
     materials = (
         clutter.worn_steel(rng),
@@ -192,12 +191,11 @@ def _canvas(rng: VariantRng) -> tuple[Material, Material]:
     )
 
 
-def market_stall(seed: int) -> Solid:
+def market_stall(rng: VariantRng) -> Solid:
     """A stall that sells towards +X: awning, table with crates of produce, boxes below.
 
     Slots: steel, wood, cloth of the table, crates, canvas, stripes, three kinds of produce.
     """
-    rng = variant_rng("market_stall", seed)
     half, deep, table = 0.5 * rng.between(2.4, 3.4, "width_m"), 1.0, 0.82
     parts = []
     for x in (-deep, deep - 0.1):

@@ -15,7 +15,7 @@ from gen_data.content.procedural import patches, surface_shapes
 from gen_data.content.procedural.material_presets import painted_material, patterned_material
 from gen_data.content.scenery import basic_shapes, clutter_shapes, street_furniture
 from gen_data.core import errors, se3
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 BALES = ("round", "round", "wrapped", "square", "stack", "wrapped")
 PYLONS = ("danube", "single", "barrel", "danube")
@@ -33,12 +33,11 @@ _BUNDLE_M = 0.03
 ones would break up into dots far away."""
 
 
-def straw_bale(seed: int) -> Solid:
+def straw_bale(rng: VariantRng) -> Solid:
     """A bale of straw or of silage in film; round ones are 1.2 to 1.5 m wide (assumed).
 
     Slots: straw or film, ends or cords.
     """
-    rng = variant_rng("straw_bale", seed)
     kind = rng.turn(BALES, "kind")
     if kind in ("round", "wrapped"):
         radius, half = 0.5 * rng.between(1.2, 1.5), 0.5 * rng.between(1.15, 1.25, "width_m")

@@ -14,10 +14,9 @@ from gen_data.content.scenery.facade import BASE, METAL, Opening
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
 
-def garage(seed: int) -> Solid:
+def garage(rng: VariantRng) -> Solid:
     """A garage for one or two cars."""
-    rng = variant_rng("garage", seed)
-    return _garage(seed, rng.choose((1, 1, 2), "doors"), rng)
+    return _garage(rng.seed, rng.choose((1, 1, 2), "doors"), rng)
 
 
 def garage_row(seed: int) -> Solid:

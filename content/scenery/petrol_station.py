@@ -19,18 +19,17 @@ from gen_data.content.procedural.surface_shapes import ball, block, cone, lathe
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid
 from gen_data.content.scenery.clutter_shapes import worn_paint
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 BRANDS = ("#1f5fa8 #e9e9e4", "#d9a520 #b3261e", "#2f7a3a #e0c020", "#b3261e #e9e9e4")
 FOUNTAINS = ("bowl", "column", "jet", "bowl")
 
 
-def petrol_shop(seed: int) -> Solid:
+def petrol_shop(rng: VariantRng) -> Solid:
     """The shop of a petrol station: a flat box with a glass front to +X and a coloured fascia.
 
     Slots: walls, frames, panes, fascia, stripe, posters, base.
     """
-    rng = variant_rng("petrol_shop", seed)
     x = 0.5 * rng.between(6.5, 9.0, "depth_m")
     half = 0.5 * rng.between(10.0, 15.0, "width_m")
     high = rng.between(3.6, 4.2, "height_m")
@@ -55,14 +54,14 @@ def petrol_shop(seed: int) -> Solid:
                                           (low, low + 1.0), 5))  # fmt: skip
     wide = 0.8 * half + 0.1
     parts.append(block((x, -wide, high - 1.05), (x + 0.08, wide, high - 0.95), 0.0, 1))
-    first, second = in_turn(BRANDS, seed).split()
+    first, second = in_turn(BRANDS, rng.seed).split()
     materials = (
         patterned_material("texture/concrete?seed=1", 3.0, 0.85, (0.9, 0.89, 0.86)),
         painted_material("#3b3d3f", 0.4),
         Material((0.05, 0.055, 0.06), roughness=0.08, role="window"),
         worn_paint((first,), 0.4, rng),
         worn_paint((second,), 0.4, rng),
-        printed_material(f"texture/poster?seed={seed % 12}", 0.5),
+        printed_material(f"texture/poster?seed={rng.seed % 12}", 0.5),
         painted_material("#55585a", 0.8),
     )
     return make_solid(parts, materials, [hulls.box((-x, -half, 0.0), (x, half, high))])
@@ -73,12 +72,11 @@ def petrol_shop_facts(seed: int) -> Facts:
     return Facts("petrol_shop", {"brand": in_turn(BRANDS, seed)})
 
 
-def price_sign(seed: int) -> Solid:
+def price_sign(rng: VariantRng) -> Solid:
     """The pylon sign of a petrol station: an emblem over rows of prices, readable from +X and -X.
 
     Slots: body, stripe, display, digits, base.
     """
-    rng = variant_rng("price_sign", seed)
     high = rng.between(5.0, 7.5, "height_m")
     half = 0.5 * rng.between(1.5, 1.9, "width_m")
     thick = 0.16
@@ -103,7 +101,7 @@ def price_sign(seed: int) -> Solid:
             )
             for part in (face, *digits, name):
                 parts.append(part if way > 0.0 else part.rotated("z", math.pi))
-    first, second = in_turn(BRANDS, seed).split()
+    first, second = in_turn(BRANDS, rng.seed).split()
     materials = (
         worn_paint((first,), 0.4, rng),
         worn_paint((second,), 0.4, rng),
@@ -120,12 +118,11 @@ def price_sign_facts(seed: int) -> Facts:
     return Facts("price_sign", {"brand": in_turn(BRANDS, seed)})
 
 
-def fountain(seed: int) -> Solid:
+def fountain(rng: VariantRng) -> Solid:
     """A fountain of stone: a basin with a bowl, a column with spouts, or a low jet.
 
     Slots: stone, water, steel.
     """
-    rng = variant_rng("fountain", seed)
     kind = rng.turn(FOUNTAINS, "kind")
     radius, rim = rng.between(1.6, 2.8, "radius_m"), rng.between(0.45, 0.6, "rim_m")
     sides = rng.choose((8, 24, 24), "sides")

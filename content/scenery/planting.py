@@ -17,7 +17,7 @@ from gen_data.content.procedural.surface_shapes import ball, block
 from gen_data.content.scenery import foliage, leaf_cards
 from gen_data.core.asset_types import ConvexParts, Material, MeshData
 from gen_data.core.noise import uniform
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 _GREENS = (
     ("small", "#4f6a34", "#5d783d", "#6d8849"),
@@ -36,11 +36,10 @@ _Ball = tuple[float, float, float, float]
 """Centre and radius [m]."""
 
 
-def hedge(seed: int) -> Solid:
+def hedge(rng: VariantRng) -> Solid:
     """A hedge of 2, 3 or 4 m that joins others end to end: clipped, or wild every third time."""
-    rng = variant_rng("hedge", seed)
-    long = float(in_turn((2.0, 3.0, 4.0), seed // 3))
-    if hedge_facts(seed).subcategory == "wild_hedge":
+    long = float(in_turn((2.0, 3.0, 4.0), rng.seed // 3))
+    if hedge_facts(rng.seed).subcategory == "wild_hedge":
         return _wild_hedge(long, rng)
     wide, high = rng.between(0.45, 0.9, "width_m"), rng.between(0.8, 2.0, "height_m")
     core = block(
@@ -61,10 +60,9 @@ def hedge_facts(seed: int) -> Facts:
     return Facts("wild_hedge" if seed % 3 == 2 else "hedge")
 
 
-def shrub(seed: int) -> Solid:
+def shrub(rng: VariantRng) -> Solid:
     """A shrub, 0.5-3 m high, upright, round or spreading; every third one flowers."""
-    rng = variant_rng("shrub", seed)
-    wide, high = in_turn(((0.8, 1.0), (1.1, 0.8), (0.6, 1.4), (1.4, 0.7), (0.9, 1.2)), seed)
+    wide, high = in_turn(((0.8, 1.0), (1.1, 0.8), (0.6, 1.4), (1.4, 0.7), (0.9, 1.2)), rng.seed)
     scale = rng.between(0.6, 1.7, "scale")
     radius, height = 0.6 * wide * scale, 1.1 * high * scale
     lobes = [(0.0, 0.0, 0.55 * height, 0.72 * radius), (0.0, 0.0, 0.4 * radius, 0.6 * radius)]
@@ -74,14 +72,13 @@ def shrub(seed: int) -> Solid:
         lobes.append(
             (away * math.cos(turn), away * math.sin(turn), z, rng.between(0.4, 0.6) * radius)
         )
-    flowers = rng.choose(_PETALS) if seed % 3 == 0 else ""
-    return _lobed(lobes, height, seed % 6, flowers, rng)
+    flowers = rng.choose(_PETALS) if rng.seed % 3 == 0 else ""
+    return _lobed(lobes, height, rng.seed % 6, flowers, rng)
 
 
-def grass_tuft(seed: int) -> Solid:
+def grass_tuft(rng: VariantRng) -> Solid:
     """Tall grass and weeds, 0.12-0.7 m high, in a patch along a kerb or a joint."""
-    rng = variant_rng("grass_tuft", seed)
-    high = in_turn((0.14, 0.28, 0.45, 0.62), seed)
+    high = in_turn((0.14, 0.28, 0.45, 0.62), rng.seed)
     long, wide = rng.between(0.15, 1.4, "length_m"), rng.between(0.05, 0.22, "width_m")
     count = max(18, round(rng.between(26, 40) * max(long, 0.5)))
     x, y = ((uniform(count, rng) - 0.5) * side for side in (wide, long))
@@ -100,7 +97,7 @@ def grass_tuft(seed: int) -> Solid:
     level = rng.between(1.0, 1.4)
     colors = rng.shuffled(_STRAW)[:3]
     shades = [leaf_cards.leaf_material("blades", code, level) for code in colors]
-    if seed % 4 == 1:
+    if rng.seed % 4 == 1:
         # Dandelions and the like.
         shades[2] = leaf_cards.leaf_material("blossom", rng.choose(_PETALS[2:5]), 1.0)
     # Upright cards are seen from both sides: their normals are mostly their own.
@@ -109,9 +106,8 @@ def grass_tuft(seed: int) -> Solid:
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
 
-def flower_bed(seed: int) -> Solid:
+def flower_bed(rng: VariantRng) -> Solid:
     """A bed of 1.2-3 m with an edging of stone or steel, leaves and flowers in drifts."""
-    rng = variant_rng("flower_bed", seed)
     wide = rng.between(0.6, 1.2, "width_m")
     long = rng.between(1.2, 3.0, "length_m")
     rim = rng.between(0.05, 0.2, "rim_m")
@@ -144,9 +140,8 @@ def flower_bed(seed: int) -> Solid:
     return _boxed(foliage.merge_meshes(mesh, leafy))
 
 
-def ivy_wall(seed: int) -> Solid:
+def ivy_wall(rng: VariantRng) -> Solid:
     """Ivy on a wall at x = 0 that faces +X: a ragged patch 1.5-4 m wide and 2-6 m high."""
-    rng = variant_rng("ivy_wall", seed)
     wide, high = rng.between(1.5, 4.0, "width_m"), rng.between(2.0, 6.0, "height_m")
     lanes = 6
     tops = high * (0.35 + 0.65 * uniform(lanes, rng))

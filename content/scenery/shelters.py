@@ -23,12 +23,11 @@ PHONES = ("glass", "paned", "pillar", "glass", "pillar", "paned")
 _GLASS = Material((0.9, 0.95, 0.93), roughness=0.05, transmission=1.0, role="glass")
 
 
-def bus_shelter(seed: int) -> Solid:
+def bus_shelter(rng: VariantRng) -> Solid:
     """A shelter open to +X with a seat, an advertisement and a stop sign in front.
 
     Slots: frame, glass, roof, seat, two prints, sign.
     """
-    rng = variant_rng("bus_shelter", seed)
     kind = rng.turn(ROOFS, "roof")
     half = 0.5 * rng.between(3.0, 5.0, "width_m")
     x = 0.5 * rng.between(1.3, 1.7, "depth_m")
@@ -60,7 +59,7 @@ def bus_shelter(seed: int) -> Solid:
     color = worn_paint(("#2f3234", "#3b3d3f", "#6b7073", "#2f4236", "#8d9091"), 0.45, rng)
     wood = presets.patterned_material("texture/wood_grain?seed=2", 1.2, 0.7, (0.8, 0.75, 0.7))
     prints = [
-        presets.printed_material(f"texture/poster?seed={(5 * seed + k) % 12}", 0.35)
+        presets.printed_material(f"texture/poster?seed={(5 * rng.seed + k) % 12}", 0.35)
         for k in range(2)
     ]
     roof = worn_paint(("#5f6365", "#3b3d3f", "#c9cccb", "#7a2a24"), 0.5, rng)
@@ -125,12 +124,11 @@ def _stop_sign(x: float, y: float) -> list[Patch]:
     return [post(0.03, (0.0, 2.7), (x - 0.05, y, 0.0)), disc.moved(x - 0.03, y, 2.55), box, face]
 
 
-def phone_box(seed: int) -> Solid:
+def phone_box(rng: VariantRng) -> Solid:
     """A telephone box: glass walls, small panes, or an open pillar with a hood.
 
     Slots: frame, glass, roof, telephone, notices.
     """
-    rng = variant_rng("phone_box", seed)
     kind = rng.turn(PHONES, "kind")
     half, high = 0.5 * rng.between(0.86, 0.96, "width_m"), rng.between(2.2, 2.45, "height_m")
     if kind == "pillar":
@@ -156,7 +154,7 @@ def phone_box(seed: int) -> Solid:
         _GLASS,
         rng.choose((frame, presets.painted_material("#55585a", 0.5))),
         presets.painted_material("#26282a", 0.4),
-        presets.printed_material(f"texture/poster?seed={seed % 12}", 0.4),
+        presets.printed_material(f"texture/poster?seed={rng.seed % 12}", 0.4),
     )
     return make_solid(parts, materials, [hulls.box((-half, -half, 0.0), (half, half, 2.0))])
 
@@ -186,14 +184,13 @@ def _booth(half: float, high: float, rows: int) -> list[Patch]:
     return parts
 
 
-def level_crossing_barrier(seed: int) -> Solid:
+def level_crossing_barrier(rng: VariantRng) -> Solid:
     """A half barrier of a level crossing, its boom along Y, lowered or (every third) raised.
 
     Traffic comes from +X. With lights and a saltire (Vienna Convention, A,28). Slots: red, white,
     grey, lens, black.
     """
-    rng = variant_rng("level_crossing_barrier", seed)
-    raised, reach = _is_raised(seed), rng.between(3.5, 5.5, "reach_m")
+    raised, reach = _is_raised(rng.seed), rng.between(3.5, 5.5, "reach_m")
     parts = [
         block((-0.22, -0.25, 0.0), (0.22, 0.25, 0.1), 0.01, 2),
         block((-0.18, -0.2, 0.1), (0.18, 0.2, 1.05), 0.02, 2),
@@ -237,12 +234,11 @@ def _is_raised(seed: int) -> bool:
     return variant_rng("level_crossing_barrier", seed).turn((False, False, True), "raised")
 
 
-def petrol_canopy(seed: int) -> Solid:
+def petrol_canopy(rng: VariantRng) -> Solid:
     """The canopy of a petrol station along Y, with islands of pumps below.
 
     Slots: fascia, ceiling, steel, pump body, pump front, hoses, kerb, lights, trim.
     """
-    rng = variant_rng("petrol_canopy", seed)
     x, half, low = _canopy_m(rng)
     parts = [
         block((-x, -half, low), (x, half, low + 0.9), 0.03),

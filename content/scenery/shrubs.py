@@ -12,7 +12,7 @@ from gen_data.content.procedural.patches import Array, Patch, finish_mesh, join_
 from gen_data.content.procedural.surface_shapes import ball, block
 from gen_data.content.scenery import foliage, leaf_cards, trees
 from gen_data.core.asset_types import ConvexParts, Material
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _GREENS = (
     ("#26331d", "#344527", "#455833", "#586c42"),
@@ -22,9 +22,8 @@ _GREENS = (
 _FLOWERS = ("#b33a4a", "#d8c7d9", "#d9b23a", "#9a4f9c", "#e6e2dc")
 
 
-def bush(seed: int) -> Solid:
+def bush(rng: VariantRng) -> Solid:
     """A free-growing shrub, 0.7-1.8 m high. Slots: core, then shades of leaf."""
-    rng = variant_rng("bush", seed)
     h = rng.between(0.7, 1.8, "height_m")
     lobes = []
     for k in range(5):
@@ -40,9 +39,8 @@ def bush(seed: int) -> Solid:
     return _leafy(core, anchors, 0.3 * h, foliage.Habit(2400, length, 0.6 * length), hull, rng)
 
 
-def planter(seed: int) -> Solid:
+def planter(rng: VariantRng) -> Solid:
     """A tub or trough with a plant, flowering in some. Slots: tub, soil and core, leaves."""
-    rng = variant_rng("planter", seed)
     w = rng.between(0.45, 0.6, "width_m")
     long = rng.between(0.6, 1.4, "length_m")
     h = rng.between(0.4, 0.6, "height_m")

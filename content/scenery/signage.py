@@ -15,21 +15,20 @@ from gen_data.content.procedural.surface_shapes import block, grid, lathe, round
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.content.scenery.clutter_shapes import on_ground, worn_paint, worn_steel
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 BILLBOARDS = ("hoarding", "light_box", "a_board", "tall", "light_box", "hoarding", "a_board")
 POSTERS, WIDE_POSTERS, STREET_NAMES = 12, 8, 12
 """Variants of the textures of posters.py that are used."""
 
 
-def billboard(seed: int) -> Solid:
+def billboard(rng: VariantRng) -> Solid:
     """A hoarding of 3.56 x 2.52 m (18/1 sheets) on legs or a mast, a light box, an A-board.
 
     Slots: frame, print in front, print behind.
     """
-    rng = variant_rng("billboard", seed)
     kind = rng.turn(BILLBOARDS, "kind")
-    prints = _posters(seed, "wide_poster" if kind in {"hoarding", "tall"} else "poster")
+    prints = _posters(rng.seed, "wide_poster" if kind in {"hoarding", "tall"} else "poster")
     if kind == "a_board":
         parts, hull = _a_board()
     elif kind == "light_box":
@@ -91,9 +90,8 @@ def _a_board() -> tuple[list[Patch], np.ndarray]:
     return on_ground(parts), hulls.box((-0.24, -half, 0.0), (0.24, half, high))
 
 
-def advertising_column(seed: int) -> Solid:
+def advertising_column(rng: VariantRng) -> Solid:
     """A column of 1.2 to 1.4 m for posters, with a foot and a cap. Slots: body, trim, 4 posters."""
-    rng = variant_rng("advertising_column", seed)
     r, high = rng.between(0.58, 0.7, "radius_m"), rng.between(2.7, 3.3, "height_m")
     parts = [
         lathe([(0.0, 0.0), (r + 0.08, 0.0), (r + 0.08, 0.3), (r, 0.36), (r, high)], 28),
@@ -114,7 +112,8 @@ def advertising_column(seed: int) -> Solid:
     body = worn_paint(("#8d9091", "#d8d2c2", "#5f6d62", "#3f5a4a"), 0.7, rng)
     trim = worn_paint(("#2f4236", "#3b3d3f", "#2f3f5a", "#5f6d62"), 0.5, rng)
     prints = [
-        printed_material(f"texture/poster?seed={(seed * 5 + k) % POSTERS}", 0.6) for k in range(4)
+        printed_material(f"texture/poster?seed={(rng.seed * 5 + k) % POSTERS}", 0.6)
+        for k in range(4)
     ]
     return make_solid(parts, (body, trim, *prints), [hulls.frustum((r, 0.0), (r, high), 16)])
 
@@ -126,9 +125,8 @@ def _pasted(radius: float, turn: tuple[float, float], z_m: tuple[float, float], 
     return grid(np.stack([np.insert(ring, 2, z, axis=1) for z in z_m]), slot=slot)
 
 
-def street_name_plate(seed: int) -> Solid:
+def street_name_plate(rng: VariantRng) -> Solid:
     """One or two name plates of a crossing on a post, 0.8-0.95 x 0.2 m. Slots: post, plates."""
-    rng = variant_rng("street_name_plate", seed)
     high, half = rng.between(2.5, 2.9, "height_m"), 0.5 * rng.between(0.76, 0.94, "width_m")
     parts = [
         post(0.03, (0.0, high)),
@@ -145,7 +143,7 @@ def street_name_plate(seed: int) -> Solid:
             # Crosswise.
             parts.append(part.rotated("z", 0.5 * math.pi * k))
     names = [
-        printed_material(f"texture/street_name?seed={(seed + k) % STREET_NAMES}", 0.35)
+        printed_material(f"texture/street_name?seed={(rng.seed + k) % STREET_NAMES}", 0.35)
         for k in (0, 5)
     ]
     return make_solid(

@@ -21,16 +21,15 @@ from gen_data.content.procedural.patches import Patch, join_patches
 from gen_data.content.procedural.surface_shapes import block, cone, lathe, rounded_box
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post, tube
 from gen_data.core import asset_types, se3
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 GALVANISED = metal_material((0.42, 0.43, 0.44), 0.55)
 _ANTHRACITE = painted_material("#3b3d3f", 0.5)
 _IRON_PAINTS = ("#2f3234", "#3b3d3f", "#2f4236", "#55585a")
 
 
-def street_light(seed: int) -> Solid:
+def street_light(rng: VariantRng) -> Solid:
     """A lamp on a mast of 6-8 m. Slots: mast, lamp. Keypoint ``lamp``."""
-    rng = variant_rng("street_light", seed)
     height, reach = rng.between(6.0, 8.0, "height_m"), rng.between(0.8, 1.8, "reach_m")
     foot = [(0.0, 0.0), (0.085, 0.0), (0.085, 1.1), (0.06, 1.16)]
     mast = lathe([*foot, (0.038, height), (0.0, height)], 12)
@@ -43,9 +42,8 @@ def street_light(seed: int) -> Solid:
     return make_solid([mast, head, lens.painted(1)], (finish, glass), [hull], keypoints)
 
 
-def litter_bin(seed: int) -> Solid:
+def litter_bin(rng: VariantRng) -> Solid:
     """A litter bin on a post, or standing. Slots: body, post."""
-    rng = variant_rng("litter_bin", seed)
     color = rng.choose(("#3a5a40", "#d9702b", "#44484a", "#2f3234", "#6b7073"))
     materials = (painted_material(color, 0.45), GALVANISED)
     if rng.chance(0.5):
@@ -68,9 +66,8 @@ def litter_bin(seed: int) -> Solid:
     return make_solid(parts, materials, [hulls.frustum((r, 0.0), (r, h), 12)])
 
 
-def bench(seed: int) -> Solid:
+def bench(rng: VariantRng) -> Solid:
     """A park bench, sat on from +X. Slots: slats, frame."""
-    rng = variant_rng("bench", seed)
     half, seat = 0.5 * rng.between(1.5, 2.0, "length_m"), rng.between(0.42, 0.46, "seat_m")
     slats = [(-0.18 + 0.115 * k, seat - 0.03, 0.09, 0.03) for k in range(4)]
     if rng.chance(0.75):
@@ -87,9 +84,8 @@ def bench(seed: int) -> Solid:
     return make_solid(parts, (wood, painted_material(rng.choose(_IRON_PAINTS), 0.5)), [hull])
 
 
-def hydrant(seed: int) -> Solid:
+def hydrant(rng: VariantRng) -> Solid:
     """A pillar hydrant with two outlets (EN 14384). Slots: body, caps."""
-    rng = variant_rng("hydrant", seed)
     h = rng.between(0.75, 0.95, "height_m")
     foot = [(0.0, 0.0), (0.16, 0.0), (0.16, 0.04), (0.105, 0.06)]
     shares = ((0.1, 0.62), (0.135, 0.65), (0.135, 0.72), (0.11, 0.74), (0.1, 0.9), (0.05, 0.97))
@@ -109,10 +105,9 @@ def hydrant(seed: int) -> Solid:
     return make_solid(parts, (painted_material(paint, 0.4), painted_material(caps, 0.4)), [hull])
 
 
-def bollard(seed: int) -> Solid:
+def bollard(rng: VariantRng) -> Solid:
     """A bollard: iron with a cap, steel with a reflecting band, or stone. Slots: body, band."""
-    rng = variant_rng("bollard", seed)
-    h, kind = rng.between(0.8, 1.0, "height_m"), _bollard_kind(seed)
+    h, kind = rng.between(0.8, 1.0, "height_m"), _bollard_kind(rng.seed)
     if kind == "stone":
         r = rng.between(0.13, 0.18, "radius_m")
         shares = ((0.0, 0.0), (1.0, 0.0), (0.92, 0.7), (0.6, 0.82), (0.0, 0.86))
@@ -165,9 +160,8 @@ def traffic_cone(seed: int) -> Solid:
     return make_solid([*pieces, tip, foot], (orange, white, base), shells)
 
 
-def post_box(seed: int) -> Solid:
+def post_box(rng: VariantRng) -> Solid:
     """A letter box on two legs or on a wall post. Slots: body, flap, legs."""
-    rng = variant_rng("post_box", seed)
     w = rng.between(0.45, 0.6, "width_m")
     d = rng.between(0.3, 0.4, "depth_m")
     h = rng.between(0.6, 0.75, "height_m")
@@ -185,9 +179,8 @@ def post_box(seed: int) -> Solid:
     return make_solid(parts, materials, [hull])
 
 
-def bus_stop(seed: int) -> Solid:
+def bus_stop(rng: VariantRng) -> Solid:
     """A shelter, open to +X, with a seat. Slots: frame, glass, roof, seat, panel."""
-    rng = variant_rng("bus_stop", seed)
     half = 0.5 * rng.between(3.2, 4.2, "width_m")
     d = rng.between(1.3, 1.6, "depth_m")
     h = rng.between(2.35, 2.55, "height_m")
@@ -214,7 +207,7 @@ def bus_stop(seed: int) -> Solid:
     parts = [*posts, *(p.painted(1) for p in panes), roof.painted(2), seat.painted(3), *legs, panel]
     parts += [p.painted(4) for p in poster]
     wood = patterned_material("texture/wood_grain?seed=2", 1.2, 0.7, (0.8, 0.75, 0.7))
-    art = replace(printed_material(f"texture/book_cover?seed={seed % 32}", 0.35), role="sign")
+    art = replace(printed_material(f"texture/book_cover?seed={rng.seed % 32}", 0.35), role="sign")
     walls = [
         hulls.box((-x - 0.03, -half, 0.0), (-x + 0.03, half, h)),
         hulls.box((-x, -half, h), (x, half, h + 0.1)),
@@ -223,9 +216,8 @@ def bus_stop(seed: int) -> Solid:
     return make_solid(parts, (frame, glass, painted_material("#5f6365", 0.5), wood, art), walls)
 
 
-def cabinet(seed: int) -> Solid:
+def cabinet(rng: VariantRng) -> Solid:
     """A distribution cabinet with two doors and a lid. Slots: body, seams, plinth."""
-    rng = variant_rng("cabinet", seed)
     w = rng.between(0.7, 1.5, "width_m")
     d = rng.between(0.3, 0.45, "depth_m")
     h = rng.between(0.95, 1.35, "height_m")
@@ -244,9 +236,8 @@ def cabinet(seed: int) -> Solid:
     return make_solid(parts, (grey, painted_material("#3b3d3f", 0.6), concrete), [hull])
 
 
-def bike_rack(seed: int) -> Solid:
+def bike_rack(rng: VariantRng) -> Solid:
     """A row of hoops; bicycles lean against them along X. Slot: hoops."""
-    rng = variant_rng("bike_rack", seed)
     count, pitch = rng.choose((2, 3, 4, 5), "count"), rng.between(0.8, 1.0, "pitch_m")
     half, h = 0.5 * rng.between(0.7, 0.9, "width_m"), rng.between(0.75, 0.85, "height_m")
     bend = [(half, 0.0), (half, h - 0.15), (half - 0.04, h - 0.04), (half - 0.15, h)]

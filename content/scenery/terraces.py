@@ -23,12 +23,11 @@ _JOINT_M = 0.06
 """Grass between the slabs of a path."""
 
 
-def terrace(seed: int) -> Solid:
+def terrace(rng: VariantRng) -> Solid:
     """A terrace or deck of 3 to 5 m with a table and chairs, or a path of 5 to 10 m.
 
     Slots: pavement, then those of the chairs.
     """
-    rng = variant_rng("terrace", seed)
     kind = rng.turn(_KINDS, "kind")
     if kind == "path":
         wide = rng.between(0.6, 1.1, "width_m")

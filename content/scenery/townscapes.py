@@ -13,7 +13,7 @@ from gen_data.content.procedural.patches import Array, Patch, finish_mesh, join_
 from gen_data.content.procedural.surface_shapes import ball, block, cone, grid
 from gen_data.content.scenery import basic_shapes, horizons
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 TOWN_M, SKYLINE_M = 60.0, 90.0
 """Lengths of the pieces along Y."""
@@ -51,12 +51,11 @@ class _Block:
         return self.base_m + self.storeys * self.storey_m
 
 
-def skyline(seed: int) -> Solid:
+def skyline(rng: VariantRng) -> Solid:
     """Blocks and towers of a city, 90 m long and 12-80 m high, some with a narrower top.
 
     By night, a lamp may light each piece's windows (role ``window``).
     """
-    rng = variant_rng("horizon/skyline", seed)
     tall = rng.choose((0.15, 0.4, 0.7))
     parts: list[Patch] = []
     for row in range(2):
@@ -75,12 +74,11 @@ def skyline(seed: int) -> Solid:
     return _piece(parts, colors, rng)
 
 
-def town(seed: int) -> Solid:
+def town(rng: VariantRng) -> Solid:
     """Houses of two to four storeys under steep roofs, 60 m long; every fourth piece has a church.
 
     Gables, hips, chimneys and trees between the houses break the line of the roofs.
     """
-    rng = variant_rng("horizon/town", seed)
     parts: list[Patch] = []
     for row in range(2):
         y = -0.5 * TOWN_M
@@ -94,7 +92,7 @@ def town(seed: int) -> Solid:
             y += width + (rng.between(2.0, 8.0) if rng.chance(0.5) else 0.0)
     for _ in range(5):
         parts.append(_crown((-rng.between(4.0, 28.0), rng.between(-0.48, 0.48) * TOWN_M), rng))
-    if seed % 4 == 0:
+    if rng.seed % 4 == 0:
         parts += _church(rng)
     colors = ("#e0d8c6", "#d2c3a4", "#c9a98a", "#dcdad2", "#c4b7a8", "#b5876b", "#d8cfae")
     return _piece(parts, colors, rng)

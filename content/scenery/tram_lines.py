@@ -5,15 +5,14 @@ from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import painted_material
 from gen_data.content.procedural.surface_shapes import block, cone
 from gen_data.content.scenery.basic_shapes import make_solid
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 ANCHOR_M, POLE_M = 6.9, 7.2
 """Heights of the cross wire's ends, and of the poles."""
 
 
-def tram_pole(seed: int) -> Solid:
+def tram_pole(rng: VariantRng) -> Solid:
     """A steel pole that holds a cross wire. Slots: paint, foot."""
-    rng = variant_rng("tram_pole", seed)
     foot = rng.between(0.11, 0.14, "foot_m")
     parts = [
         cone((foot, 0.0), (0.62 * foot, POLE_M), 10),

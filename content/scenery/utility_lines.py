@@ -151,12 +151,11 @@ def _half_spans(span_m: float, radius: float) -> list[Patch]:
     return parts
 
 
-def power_box(seed: int) -> Solid:
+def power_box(rng: VariantRng) -> Solid:
     """A cabinet of a network: telephone, power, gas meter, parcels, small substation.
 
     Faces +X. Slots: body, seams, plinth, sticker, roof. Sizes: assumed from makers' catalogues.
     """
-    rng = variant_rng("power_box", seed)
     kind = rng.turn(BOXES, "kind")
     w, d, h = {
         "telecom": (0.75, 0.31, 1.05), "power": (0.79, 0.32, 1.1), "kiosk": (1.25, 0.45, 1.4),
@@ -185,7 +184,7 @@ def power_box(seed: int) -> Solid:
         painted_material(paint, 0.55),
         painted_material("#2f3132", 0.6),
         patterned_material("texture/concrete?seed=3", 1.5, 0.9),
-        printed_material(f"texture/poster?seed={seed % 12}", 0.4),
+        printed_material(f"texture/poster?seed={rng.seed % 12}", 0.4),
         painted_material(rng.choose(("#55585a", "#8d9091", "#3f4a42")), 0.6),
     )
     return make_solid(parts, materials, [hulls.box((-x, -y, 0.0), (x, y, h))])

@@ -142,12 +142,11 @@ def _lid(x_m: tuple[float, float], w: float, z_m: tuple[float, float], state: st
     return [lid.rotated("y", turn).moved(x0, 0.0, z0)]
 
 
-def rubbish_bags(seed: int) -> Solid:
+def rubbish_bags(rng: VariantRng) -> Solid:
     """A heap of full bags put out for collection; cardboard boxes beside them on some.
 
     Slots: bags in two colours, cardboard, printed cardboard.
     """
-    rng = variant_rng("rubbish_bags", seed)
     count = rng.turn((1, 3, 5, 2, 4, 6, 3, 5), "count")
     parts, r = [], 0.0
     for k in range(count):
@@ -161,14 +160,14 @@ def rubbish_bags(seed: int) -> Solid:
         low = 0.3 if k >= 4 else 0.0
         bag = bag.moved(r * math.cos(turn), r * math.sin(turn), low)
         parts.append(bag.painted(int(rng.chance(0.25))))
-    if seed % 2:
+    if rng.seed % 2:
         parts += _boxes(r + 0.42, rng)
     color, other = rng.choose(_BAGS), rng.choose(_BAGS)
     materials = (
         Material(painted_material(color, 0.35).base_color, roughness=rng.between(0.25, 0.4)),
         Material(painted_material(other, 0.35).base_color, roughness=rng.between(0.25, 0.4)),
         patterned_material("texture/cardboard?seed=1", 0.6, 0.9),
-        printed_material(f"texture/poster?seed={seed % 12}", 0.6),
+        printed_material(f"texture/poster?seed={rng.seed % 12}", 0.6),
     )
     corners = np.concatenate([p.corners_m.reshape(-1, 3) for p in parts])
     return make_solid(parts, materials, [hulls.extreme(corners, 32)])
@@ -186,13 +185,12 @@ def _boxes(x: float, rng: VariantRng) -> list[Patch]:
     return made
 
 
-def skip_container(seed: int) -> Solid:
+def skip_container(rng: VariantRng) -> Solid:
     """A skip along Y, empty or heaped with rubble, wood or greenery.
 
     Slots: paint, inside, load, planks, reflectors. Sizes of skips of 5-10 m^3: assumed, 10 %.
     """
-    rng = variant_rng("skip_container", seed)
-    half, top_half, wide, high = in_turn(((1.15, 1.7, 0.87, 1.2), (1.3, 1.85, 0.9, 1.45)), seed)
+    half, top_half, wide, high = in_turn(((1.15, 1.7, 0.87, 1.2), (1.3, 1.85, 0.9, 1.45)), rng.seed)
     shape = [(-half, 0.12), (half, 0.12), (top_half, high - 0.35), (top_half, high),
              (-top_half, high), (-top_half, high - 0.35)]  # fmt: skip
     parts = _trough(shape, wide, 0) + _trough(shape, wide - 0.05, 1, inside=True)

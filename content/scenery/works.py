@@ -98,13 +98,12 @@ def _flexible_post() -> tuple[list[Patch], float, float]:
     return parts, 0.77, 0.11
 
 
-def road_barrier(seed: int) -> Solid:
+def road_barrier(rng: VariantRng) -> Solid:
     """A barrier section of about 2 m at road works. Slots: red, white, feet, steel, lamp, concrete.
 
     Kinds: boards on posts, concrete safety shapes, plastic grilles, water-filled plastic shapes,
     boards on trestles.
     """
-    rng = variant_rng("road_barrier", seed)
     kind = rng.turn(BARRIERS, "kind")
     stone = presets.patterned_material("texture/concrete?seed=3", 2.0, 0.92, (0.9, 0.89, 0.86))
     color = rng.choose((_RED, _RED, "#d9571e"))
@@ -117,7 +116,7 @@ def road_barrier(seed: int) -> Solid:
         stone,
     )
     if kind in {"new_jersey", "water_filled"}:
-        parts, hull = _safety_shape(kind == "water_filled", seed, rng)
+        parts, hull = _safety_shape(kind == "water_filled", rng.seed, rng)
     elif kind == "plastic":
         parts, hull = _grille(rng)
     else:
@@ -218,12 +217,11 @@ def _striped(half: float, z_m: tuple[float, float], fields: int) -> list[Patch]:
     return parts
 
 
-def construction_fence(seed: int) -> Solid:
+def construction_fence(rng: VariantRng) -> Solid:
     """A site fence panel of 3.5 x 2.0 m in concrete feet; hoarding or netting on some.
 
     Panel size: usual of mobile site fences (assumed, 5 %). Slots: steel, feet, sheet, sign.
     """
-    rng = variant_rng("construction_fence", seed)
     kind = rng.turn(_SITE_FENCES, "covering")
     half, high, foot = 1.75, 2.0, 0.13
     frame = [(-half, foot), (-half, high), (half, high), (half, foot)]
@@ -254,7 +252,7 @@ def construction_fence(seed: int) -> Solid:
     color = rng.choose(("#3f6a50", "#44638a", "#d8d8d2", "#b8836a"))
     concrete = presets.patterned_material("texture/concrete?seed=3", 1.5, 0.9)
     cloth = Material(presets.draw_linear((color,), 0.15, rng), roughness=0.85)
-    sign = presets.printed_material(f"texture/poster?seed={seed % 12}", 0.4)
+    sign = presets.printed_material(f"texture/poster?seed={rng.seed % 12}", 0.4)
     hull = hulls.box((-0.05, -half, 0.0), (0.05, half, high))
     return make_solid(parts, (clutter.worn_steel(rng), concrete, cloth, sign), [hull])
 
@@ -262,13 +260,12 @@ def construction_fence(seed: int) -> Solid:
 _SITE_FENCES = ("plain", "netting", "sign", "sheet")
 
 
-def scaffold(seed: int) -> Solid:
+def scaffold(rng: VariantRng) -> Solid:
     """One bay of a facade scaffold: 2.57 m long, 0.73 m deep, lifts of 2 m; 3 to 5 lifts.
 
     Bay sizes of frame scaffolds (system widths of EN 12810: SW06 to SW09; 2.57 m is usual,
     assumed). The facade is at -X. Slots: steel, decks, boards, netting.
     """
-    rng = variant_rng("scaffold", seed)
     # Neighbouring bays have standards of their own, side by side.
     half, x0, x1, lifts = 1.25, -0.365, 0.365, rng.turn((3, 4, 3, 5), "lifts")
     top = 2.0 * lifts
@@ -288,7 +285,7 @@ def scaffold(seed: int) -> Solid:
             surfaces.block((x1 - 0.03, -half, z + 0.01), (x1 - 0.005, half, z + 0.16), 0.0, 2)
         )
     for k in range(lifts):
-        if k % 2 == seed % 2:
+        if k % 2 == rng.seed % 2:
             low, high = 2.0 * k + 0.1, 2.0 * k + 1.9
             parts.append(clutter.bar((x1 + 0.03, -half, low), (x1 + 0.03, half, high), 0.017, 5))
     if rng.turn((False, True), "netting"):

@@ -25,15 +25,14 @@ from gen_data.content.vehicles.body_shell import (
 from gen_data.content.vehicles.vehicle_materials import COLORS, SIDES, materials
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.content.vehicles.wheels import Axles
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _FLOOR_M = 0.26
 _HALF_M = 1.275
 
 
-def bus(seed: int) -> Solid:
+def bus(rng: VariantRng) -> Solid:
     """A city bus with its doors on the right. Slots and keypoints are those of all vehicles."""
-    rng = variant_rng("bus", seed)
     x, top = 0.5 * rng.between(11.2, 12.2, "depth_m"), rng.between(2.95, 3.08, "top_m")
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, "truck")
     livery = rng.choose(COLORS["liveries"]).split()

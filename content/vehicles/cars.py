@@ -9,7 +9,7 @@ from gen_data.content.vehicles.bodywork import Additions, make_vehicle
 from gen_data.content.vehicles.car_design import DESIGNS, ERAS, MODELS, Design
 from gen_data.content.vehicles.liveries import livery_ground, livery_id
 from gen_data.content.vehicles.vehicle_materials import COLORS, PLAIN, Print, draw_paint, materials
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 CARS, VANS = MODELS["car"], MODELS["van"]
 SUBCATEGORIES = {
@@ -30,28 +30,26 @@ _VAN_FACES = {"1990s": ("van_wide",), "2000s": ("van_wide", "van_tall"),
 _ESTATES = ("estate", "compact_estate", "suv", "large_suv", "mpv", "box_mpv")
 
 
-def car(seed: int, steer_deg: float) -> Solid:
+def car(rng: VariantRng, steer_deg: float) -> Solid:
     """A car. Slots and keypoints are those of all vehicles; positive steering turns to the left."""
-    rng = variant_rng("car", seed)
-    design = draw_car(*in_turn(CARS, seed), rng)
+    design = draw_car(*in_turn(CARS, rng.seed), rng)
     return make_vehicle(design, steer_deg, materials(rng, draw_paint(rng)))
 
 
-def van(seed: int, steer_deg: float) -> Solid:
+def van(rng: VariantRng, steer_deg: float) -> Solid:
     """A van. Slots and keypoints are those of all vehicles; positive steering turns to the left.
 
     Two of five panel vans carry the livery of a trade.
     """
-    rng = variant_rng("van", seed)
-    design = draw_van(*in_turn(VANS, seed), rng)
+    design = draw_van(*in_turn(VANS, rng.seed), rng)
     draw = float(rng.random())
     white, fleet = hex_to_linear("#e6e7e6"), hex_to_linear(rng.choose(COLORS["fleets"]))
     paint = white if draw < 0.55 else (fleet if draw < 0.75 else draw_paint(rng))
     printed, additions = PLAIN, Additions()
     if rng.chance(0.4) and design.windows_to < 0.6:
-        printed = Print(livery_id("trade", seed), fixed=True)
+        printed = Print(livery_id("trade", rng.seed), fixed=True)
         additions = Additions(van_image_m(design))
-        paint = livery_ground("trade", seed)
+        paint = livery_ground("trade", rng.seed)
     return make_vehicle(design, steer_deg, materials(rng, paint, printed=printed), additions)
 
 

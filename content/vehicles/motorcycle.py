@@ -17,7 +17,7 @@ from gen_data.content.vehicles.rider import Seat, blob, limb
 from gen_data.content.vehicles.vehicle_materials import COLORS, Print, materials
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.core import asset_types, se3
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 STYLES = ("naked", "sport", "scooter")
 
@@ -40,13 +40,12 @@ class _Build:
 _BUILDS = load_table(__package__, "motorcycles", _Build)
 
 
-def motorcycle(seed: int) -> Solid:
+def motorcycle(rng: VariantRng) -> Solid:
     """A motorcycle; two of three have a rider."""
-    rng = variant_rng("motorcycle", seed)
-    style = in_turn(STYLES, seed)
+    style = in_turn(STYLES, rng.seed)
     build = _BUILDS[style]
     above = [*_lamps(style, build), *_bodies(style, build)]
-    ridden = _is_ridden(seed)
+    ridden = _is_ridden(rng.seed)
     if ridden:
         above += people.rider(_seat(build), people.draw_nod(rng))
     parts, body = (

@@ -12,7 +12,7 @@ from gen_data.content.vehicles.car_design import Design, read_models
 from gen_data.content.vehicles.vehicle_materials import COLORS, Print, materials
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 _TAXIS = read_models(
     (
@@ -27,11 +27,10 @@ _CARRIERS = ("post_yellow", "parcel_brown", "post_red", "parcel_blue")
 _FOODS = ("snacks", "coffee", "ices")
 
 
-def taxi(seed: int, steer_deg: float) -> Solid:
+def taxi(rng: VariantRng, steer_deg: float) -> Solid:
     """A taxi with its sign on the roof, in colours of one of several countries."""
-    rng = variant_rng("taxi", seed)
-    design = _without_roof_load(cars.draw_car(*in_turn(_TAXIS, seed), rng))
-    paint, sign = (hex_to_linear(code) for code in in_turn(COLORS["taxis"], seed).split())
+    design = _without_roof_load(cars.draw_car(*in_turn(_TAXIS, rng.seed), rng))
+    paint, sign = (hex_to_linear(code) for code in in_turn(COLORS["taxis"], rng.seed).split())
     finish = materials(rng, paint, printed=Print(fixed=True, sign=sign))
     middle, top = _roof_m(design, 0.35), design.height_m
     parts = (
@@ -42,12 +41,11 @@ def taxi(seed: int, steer_deg: float) -> Solid:
     return bodywork.make_vehicle(design, steer_deg, finish, bodywork.Additions(parts=parts))
 
 
-def police_car(seed: int, steer_deg: float) -> Solid:
+def police_car(rng: VariantRng, steer_deg: float) -> Solid:
     """A police car with a light bar."""
-    rng = variant_rng("police_car", seed)
-    design = _without_roof_load(cars.draw_car(*in_turn(_POLICE, seed), rng))
-    kind = in_turn(_PATROLS, seed)
-    finish = _printed(kind, seed, rng)
+    design = _without_roof_load(cars.draw_car(*in_turn(_POLICE, rng.seed), rng))
+    kind = in_turn(_PATROLS, rng.seed)
+    finish = _printed(kind, rng.seed, rng)
     image = (
         (design.seams[0] - 0.1, design.seams[-1] + 0.1),
         (design.clearance_m + 0.2, design.belt_m - 0.1),
@@ -56,24 +54,23 @@ def police_car(seed: int, steer_deg: float) -> Solid:
     return bodywork.make_vehicle(replace(design, strip=False), steer_deg, finish, additions)
 
 
-def ambulance(seed: int, steer_deg: float) -> Solid:
+def ambulance(rng: VariantRng, steer_deg: float) -> Solid:
     """A van of an ambulance service with light bars in front and behind."""
-    rng = variant_rng("ambulance", seed)
     design = _closed_van("high_roof", rng)
     bars = (*_light_bar(design, _roof_m(design, 0.03)), *_light_bar(design, _roof_m(design, 0.93)))
-    return _service_van(design, in_turn(_AMBULANCES, seed), seed, rng, steer_deg, bars)
+    return _service_van(design, in_turn(_AMBULANCES, rng.seed), rng.seed, rng, steer_deg, bars)
 
 
-def delivery_van(seed: int, steer_deg: float) -> Solid:
+def delivery_van(rng: VariantRng, steer_deg: float) -> Solid:
     """A van of a post or parcel service."""
-    rng = variant_rng("delivery_van", seed)
-    body = in_turn(("panel_van", "high_roof", "compact_van", "high_roof", "panel_van"), seed)
-    return _service_van(_closed_van(body, rng), in_turn(_CARRIERS, seed), seed, rng, steer_deg, ())
+    body = in_turn(("panel_van", "high_roof", "compact_van", "high_roof", "panel_van"), rng.seed)
+    return _service_van(
+        _closed_van(body, rng), in_turn(_CARRIERS, rng.seed), rng.seed, rng, steer_deg, ()
+    )
 
 
-def food_truck(seed: int, steer_deg: float) -> Solid:
+def food_truck(rng: VariantRng, steer_deg: float) -> Solid:
     """A van with a sales hatch and an awning on its right side."""
-    rng = variant_rng("food_truck", seed)
     design = _closed_van("high_roof", rng)
     front, rear = design.x(0.5), design.x(0.86)
     y, high = -design.half_m, 0.86 * design.height_m
@@ -87,7 +84,7 @@ def food_truck(seed: int, steer_deg: float) -> Solid:
             for x in (rear, front)
         ),
     )  # fmt: skip
-    return _service_van(design, in_turn(_FOODS, seed), seed, rng, steer_deg, parts)
+    return _service_van(design, in_turn(_FOODS, rng.seed), rng.seed, rng, steer_deg, parts)
 
 
 def taxi_facts(**_: object) -> Facts:

@@ -21,26 +21,25 @@ from gen_data.content.scenery.clutter_shapes import (
 from gen_data.content.scenery.street_furniture import GALVANISED
 from gen_data.content.vehicles import bicycle, wheels
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 PARKINGS = ("stand", "leaning", "hoop", "stand", "rack", "fallen", "hoop_pair", "rack")
 _LEAN_RAD = {"stand": -0.09, "leaning": 0.2, "hoop": 0.06, "fallen": 1.38}
 TRAILERS = ("box", "flat", "cargo", "boat")
 
 
-def parked_bicycle(seed: int) -> Solid:
+def parked_bicycle(rng: VariantRng) -> Solid:
     """A bicycle without rider along X: on its stand, against a wall at -Y, at a hoop, fallen over.
 
     Some variants are rows of bicycles beside each other in a rack. Slots: those of the bicycles,
     then the hoop's or rack's.
     """
-    rng = variant_rng("parked_bicycle", seed)
     kind = rng.turn(PARKINGS, "parking")
     steel = (GALVANISED if rng.chance(0.6) else material_presets.painted_material("#3b3d3f", 0.5),)
     count = {"rack": 3, "hoop_pair": 2}.get(kind, 1)
     pieces: list[tuple[list[Patch], tuple[Material, ...]]] = []
     for k in range(count):
-        machine, finish = bicycle.bicycle_parts((seed * 5 + 7 * k) % 36)
+        machine, finish = bicycle.bicycle_parts((rng.seed * 5 + 7 * k) % 36)
         lean = _LEAN_RAD.get(kind, rng.between(-0.05, 0.05))
         along = math.pi if kind == "hoop_pair" and k else 0.0
         away = (k - 0.5 * (count - 1)) * (0.55 if kind == "rack" else 0.6)
@@ -109,13 +108,12 @@ def _rack(count: int) -> list[Patch]:
     return parts
 
 
-def kick_scooter(seed: int) -> Solid:
+def kick_scooter(rng: VariantRng) -> Solid:
     """An electric kick scooter along X, on its stand or fallen over.
 
     1.15 x 0.45 x 1.18 m, wheels of 10 inch (assumed from data sheets of shared scooters, 5 %).
     Slots: frame, deck, tyre, trim, headlight, taillight.
     """
-    rng = variant_rng("kick_scooter", seed)
     axle, r = 0.43, 0.125
     head = (0.33, 0.0, 0.32)
     grip = (0.24, 0.0, 1.14)
@@ -135,10 +133,10 @@ def kick_scooter(seed: int) -> Solid:
         rod([(-0.3, 0.0, 0.24), (-0.46, 0.0, 0.28), (-0.55, 0.0, 0.22)], 0.03, 5, 3),
         rod([(-0.05, 0.06, 0.13), (-0.08, 0.16, 0.03)], 0.009, 5, 3),
     ]  # fmt: skip
-    fallen = _is_fallen(seed)
+    fallen = _is_fallen(rng.seed)
     lean = 1.42 if fallen else -0.12
     body = join_patches(parts).rotated("x", lean)
-    color = in_turn(("#2fb35a", "#17181a", "#e9e9e4", "#e0622a", "#1fa0a8", "#7fc31f"), seed)
+    color = in_turn(("#2fb35a", "#17181a", "#e9e9e4", "#e0622a", "#1fa0a8", "#7fc31f"), rng.seed)
     materials = (
         worn_paint((color,), 0.35, rng),
         material_presets.painted_material("#1c1d1e", 0.9),
@@ -161,13 +159,12 @@ def _is_fallen(seed: int) -> bool:
     return variant_rng("kick_scooter", seed).turn((False,) * 4 + (True,), "fallen")
 
 
-def trailer(seed: int) -> Solid:
+def trailer(rng: VariantRng) -> Solid:
     """A one-axle car trailer along X, its drawbar at +X: a tarpaulin box, flat, cargo or boat.
 
     Boxes of 2.0-2.6 x 1.1-1.3 m (assumed from makers' catalogues). Slots: body, second, rim, tyre,
     taillights, tarpaulin, steel, and those of the wheels.
     """
-    rng = variant_rng("trailer", seed)
     kind = rng.turn(TRAILERS, "kind")
     half, floor = 0.5 * rng.between(2.0, 2.6, "length_m"), 0.52
     wide = 0.5 * rng.between(1.1, 1.3, "width_m")
@@ -219,7 +216,7 @@ def trailer(seed: int) -> Solid:
         Material((0.3, 0.008, 0.01), roughness=0.12, role="taillight"),
         material_presets.painted_material(sheet, 0.65),
         GALVANISED,
-        material_presets.printed_material(f"texture/licence_plate?seed={seed % 12}", 0.4),
+        material_presets.printed_material(f"texture/licence_plate?seed={rng.seed % 12}", 0.4),
         material_presets.patterned_material(
             "texture/wood_planks?seed=2", 1.2, 0.8, (0.55, 0.5, 0.45)
         ),

@@ -19,16 +19,15 @@ from gen_data.content.vehicles import body_shell, wheels
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.content.vehicles.vehicle_materials import materials
 from gen_data.core.asset_types import Keypoint
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _COLORS = ("#2f6b2f", "#a3221c", "#1f4f8f", "#c9541a", "#8f9598", "#5f8f2f")
 _HALF_M = 1.2
 """Half of the width over the tyres."""
 
 
-def tractor(seed: int) -> Solid:
+def tractor(rng: VariantRng) -> Solid:
     """A tractor without implements. Slots and keypoints are those of all vehicles."""
-    rng = variant_rng("tractor", seed)
     x = 0.5 * rng.between(4.1, 4.8, "depth_m")
     rear, front = rng.between(0.84, 0.95, "rear_m"), rng.between(0.55, 0.68, "front_m")
     top = rng.between(2.75, 3.05, "top_m")

@@ -28,7 +28,7 @@ from gen_data.content.vehicles.body_shell import (
 from gen_data.content.vehicles.vehicle_materials import COLORS, SIDES, materials
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.core.asset_types import Keypoint
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 WIRE_M = 5.5
 """Height of the contact wire, at which the pantograph's head is (assumed, 10 %)."""
@@ -38,11 +38,10 @@ _SILL_M, _LINTEL_M = 1.0, 2.62
 """Windows from sill to lintel."""
 
 
-def tram(seed: int) -> Solid:
+def tram(rng: VariantRng) -> Solid:
     """A tram with doors on both sides. Slots and keypoints are those of all vehicles."""
-    rng = variant_rng("tram", seed)
     half, x = 0.5 * rng.turn(_WIDTHS_M, "width_m"), 0.5 * rng.between(27.0, 35.0, "length_m")
-    joints = np.linspace(-x, x, (3 if seed % 2 else 5) + 1)[1:-1].tolist()
+    joints = np.linspace(-x, x, (3 if rng.seed % 2 else 5) + 1)[1:-1].tolist()
     main, second = (hex_to_linear(code) for code in rng.choose(COLORS["liveries"]).split())
     shell = [_body(half, x, joints, rng), *_running_gear(x)]
     shell += [*_roof(half, x, joints, rng), *_ends(x)]

@@ -20,7 +20,7 @@ from gen_data.content.vehicles.vehicle_materials import COLORS, SIDES, Print, ma
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.content.vehicles.wheels import Axles
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 _FLOOR_M = 0.42
 _HALF_M = 1.16
@@ -34,12 +34,11 @@ _SECOND = {"tanker": "tankers", "tipper": "tippers", "flatbed": "tippers",
 """Colours of the load by kind; boxes by default."""
 
 
-def truck(seed: int) -> Solid:
+def truck(rng: VariantRng) -> Solid:
     """A truck. Slots and keypoints are those of all vehicles; the load is the second paint.
 
     Randomizers paint the cab; boxes, tanks and beds keep the colour of their kind.
     """
-    rng = variant_rng("truck", seed)
     kind = rng.turn(KINDS, "kind")
     longest = 7.6 if kind in ("tipper", "refuse_truck") else 9.8
     x, cab, roof = (
@@ -67,9 +66,8 @@ def truck_facts(seed: int) -> Facts:
     return Facts(variant_rng("truck", seed).turn(KINDS, "kind"))
 
 
-def fire_engine(seed: int) -> Solid:
+def fire_engine(rng: VariantRng) -> Solid:
     """A fire engine with lockers, roller shutters, a ladder and beacons."""
-    rng = variant_rng("fire_engine", seed)
     x, cab, roof = (
         0.5 * rng.between(7.2, 8.4, "depth_m"),
         rng.between(2.4, 2.7, "cab_m"),

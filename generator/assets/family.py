@@ -1,6 +1,7 @@
 """Families: named generators of objects, textures and environments, and their tables."""
 
 import importlib
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -154,6 +155,24 @@ class Lazy:
 
 
 @dataclass(frozen=True)
+class Builder(Lazy):
+    """The function that makes what a family has; if it takes ``rng``, those are its draws.
+
+    Attributes:
+        family: Name of the family; with the seed, it decides all draws.
+    """
+
+    family: str = ""
+
+    def __call__(self, *args: Any, **arguments: Any) -> Any:
+        """The object or image of a seed, or of other arguments."""
+        if "rng" in inspect.signature(self.value).parameters:
+            (seed,) = args or (arguments.pop("seed"),)
+            args = (variant_rng.variant_rng(self.family, seed),)
+        return super().__call__(*args, **arguments)
+
+
+@dataclass(frozen=True)
 class Worn:
     """A generator whose objects are worn, more or less by seed.
 
@@ -262,7 +281,7 @@ def load_families(package: str) -> FamilyTables:
 
     def table(section: str, make: Callable[..., Any]) -> Mapping[str, Any]:
         rows = plain.get(section, {})
-        return {name: make(name, **_arguments(package, row)) for name, row in rows.items()}
+        return {name: make(name, **_arguments(package, name, row)) for name, row in rows.items()}
 
     return FamilyTables(
         table("objects", _object_family),
@@ -296,7 +315,7 @@ def _object_family(
     return Family(name=name, category=category or name, facts=known, **row)
 
 
-def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
+def _arguments(package: str, name: str, row: Mapping[str, Any]) -> dict[str, Any]:
     """A row of the table as keywords: lists become tuples, ``build`` a function.
 
     Facts and symmetries take the arguments that ``build: {use: ...}`` fixes, as ``build`` does.
@@ -311,7 +330,7 @@ def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
         "version": 1,
         "variants": 0,
         **row,
-        "build": replace(_lazy(package, use[1]), arguments=dict(fixed)),
+        "build": Builder(_lazy(package, use[1]).path, dict(fixed), name),
         "tags": tuple(sorted(row["tags"])),
         **({"wear": _lazy(package, row["wear"])} if "wear" in row else {}),
         "parameters": parameters,

@@ -64,12 +64,6 @@ def test_a_growing_turn_is_felt_from_the_first_to_the_last_reading() -> None:
     assert np.allclose(forces(rows)[:, 1], 10.0 * rate, atol=1e-2)
 
 
-def test_braking_is_felt_backwards() -> None:
-    rows = readings(Imu(noise=0), world(lambda t: SE3((20.0 * t - 1.5 * t * t, 0.0, 0.0))), 10)
-
-    assert np.allclose(forces(rows), [-3.0, 0.0, GRAVITY], atol=1e-6)
-
-
 def test_readings_follow_each_other_evenly_over_steps() -> None:
     """One at time 0, then ten in every step of 0.1 s; none twice, none missing."""
     rows = readings(Imu(rate_hz=100), world(), 4)

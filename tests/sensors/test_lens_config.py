@@ -85,8 +85,6 @@ def test_a_published_camera_is_scaled_to_the_width_and_cut_to_the_height() -> No
     ({"hfov_deg": 175}, "too wide for a pinhole"),
     ({"lens": {"model": "kannala_brandt", "p1": 0.1}}, "p1"),
     ({"lens": {"model": "wide"}}, "model"),
-    ({"lens": {"model": "calibrated", "camera": "euroc_cam0"}, "hfov_deg": 60},
-     "leave out hfov_deg"),
 ])  # fmt: skip
 def test_what_is_no_lens_is_refused_before_anything(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError, match=message):

@@ -61,15 +61,6 @@ def scan(sensor: LidarSensor, wall: Wall, weather: Weather | None = None, seed: 
     return cloud.points
 
 
-def test_light_falls_with_the_square_of_range() -> None:
-    """Twice as far is a quarter; the unit is the model's own sensitivity."""
-    r = np.array([10.0, 20.0, MODEL.seen.range_m], np.float32)
-    light = lidar_detection.received_light(np.full(3, MODEL.seen.reflectance, np.float32), r, MODEL)
-
-    assert light[0] / light[1] == pytest.approx(4.0, rel=1e-5)
-    assert light[2] == pytest.approx(1.0, rel=1e-5)
-
-
 def test_an_ideal_scan_reports_every_hit_where_it_is_through_a_clean_window() -> None:
     """All pulses, exact ranges, labels, one return each, intensity of the manual's scale."""
     points = scan(LidarSensor(model="VLP-16", ideal=True), Wall(30.0))
@@ -121,18 +112,6 @@ def test_an_ideal_scan_has_nothing_behind_mirrors(returns: lidar_detection.Kept)
     assert (real["surface"] == SURFACES.index("mirrored")).sum() == 3
     assert (ideal["surface"] != SURFACES.index("mirrored")).all()
     assert ideal["instance_id"][far].tolist() == [9]
-
-
-def test_half_of_the_pulses_answer_at_the_limit_of_sensitivity() -> None:
-    """As the model's data says; nearer nearly all do, farther hardly any."""
-    share = {}
-    for range_m in (0.5, 1.0, 1.9):
-        wall = Wall(range_m * MODEL.seen.range_m, MODEL.seen.reflectance)
-        share[range_m] = len(scan(LidarSensor(model="VLP-16"), wall)) / (1808 * 16)
-
-    assert share[1.0] == pytest.approx(0.5, abs=4 * math.sqrt(0.25 / 28_928))
-    assert share[0.5] > 0.99
-    assert share[1.9] < 0.01
 
 
 def test_range_noise_is_that_of_the_data_sheet_on_steps_of_the_device() -> None:

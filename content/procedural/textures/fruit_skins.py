@@ -69,10 +69,9 @@ class SkinStyle:
 SKINS: Mapping[str, SkinStyle] = load_table(_PACKAGE, "fruit_skins", SkinStyle)
 
 
-def apple_skin(seed: int) -> TextureData:
+def apple_skin(rng: VariantRng) -> TextureData:
     """Streaks from stalk to blossom over a paler ground, with pores, scars and a grocer's label."""
-    rng = variant_rng("apple_skin", seed)
-    ground, blush = colors_in_turn("apples", seed)
+    ground, blush = colors_in_turn("apples", rng.seed)
     y, _ = rows_and_columns()
     streaks = 0.6 * fbm((2, 40), 2, rng) + 0.3 * perlin((6, 90), rng)
     # The side that faced the sun is redder.
@@ -89,14 +88,13 @@ def apple_skin(seed: int) -> TextureData:
     return texture(_label(albedo, rng) if rng.chance(0.2) else albedo)
 
 
-def citrus_peel(seed: int) -> TextureData:
+def citrus_peel(rng: VariantRng) -> TextureData:
     """Dimpled by oil glands. Seeds below 1000 are oranges, below 2000 lemons, others limes."""
-    rng = variant_rng("citrus_peel", seed)
     codes = (
         ("#e8791a", "#f08c1e", "#e06a12", "#eb9a2a", "#e6a032", "#d96012"),
         ("#f0cf2c", "#f4da45", "#e6c21f", "#ddc52f"),
         ("#4f7a24", "#6b8f2c", "#3f6a20", "#93a534"),
-    )[min(seed // 1000, 2)]
+    )[min(rng.seed // 1000, 2)]
     base = draw_color(codes, 0.05, rng)
     green = color(rng.choose(("#a9a23a", "#7f8f34")))
     unripe = rng.choose((0.0, 0.0, 0.15, 0.35)) * smoothstep(0.0, 0.9, _soft(2, 2, rng))
@@ -111,12 +109,11 @@ def citrus_peel(seed: int) -> TextureData:
     return texture(_label(albedo, rng) if rng.chance(0.15) else albedo, None, -1.3 * dimple)
 
 
-def banana_peel(seed: int, ripe: float = -1.0) -> TextureData:
+def banana_peel(rng: VariantRng, ripe: float = -1.0) -> TextureData:
     """From green over yellow to spotted brown, with dark tips; ``ripe`` in [0, 1], below 0 = drawn.
 
     The stem is at the lower end of the image.
     """
-    rng = variant_rng("banana_peel", seed)
     drawn = rng.between(0.0, 1.0)
     ripe = drawn if ripe < 0.0 else ripe
     stops = ((0.0, "#8fae3a"), (0.18, "#c9c43c"), (0.35, "#e6c832"), (0.75, "#e9be2e"),
@@ -141,9 +138,8 @@ def banana_peel(seed: int, ripe: float = -1.0) -> TextureData:
     return texture(_label(albedo, rng) if rng.chance(0.25) else albedo)
 
 
-def pear_skin(seed: int) -> TextureData:
+def pear_skin(rng: VariantRng) -> TextureData:
     """Green to yellow, red or brown, freckled with lenticels."""
-    rng = variant_rng("pear_skin", seed)
     codes = ("#b5b83a", "#c7b548", "#96a03a", "#9c7a45", "#b8bd58", "#8a6a34", "#a35a34")
     base = draw_color(codes, 0.05, rng)
     blush = color(rng.choose(("#b0583a", "#a88a3a", "#8f9a3a", "#9a3a2c")))

@@ -7,12 +7,11 @@ import numpy as np
 from gen_data.content.procedural.textures.texture_images import mix_colors, ramp, texture
 from gen_data.core.asset_types import Float32, TextureData
 from gen_data.core.noise import SIZE_PX, fbm, rows_and_columns, smoothstep, uniform, worley
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 
-def checker(seed: int) -> TextureData:
+def checker(rng: VariantRng) -> TextureData:
     """Two-coloured squares; any scale."""
-    rng = variant_rng("checker", seed)
     count = 2 * rng.choose((1, 2, 3, 4, 6, 8))
     y, x = rows_and_columns()
     odd = (np.floor(y * count) + np.floor(x * count)) % 2
@@ -20,9 +19,8 @@ def checker(seed: int) -> TextureData:
     return texture(mix_colors(np.broadcast_to(first, (SIZE_PX, SIZE_PX, 3)), second, odd))
 
 
-def stripes(seed: int) -> TextureData:
+def stripes(rng: VariantRng) -> TextureData:
     """Straight stripes of two to four colours, upright, level or diagonal; any scale."""
-    rng = variant_rng("stripes", seed)
     y, x = rows_and_columns()
     down, across = rng.choose(((0, 1), (1, 0), (1, 1), (-1, 1)))
     position = rng.choose((2, 3, 4, 6, 9)) * (down * y + across * x)
@@ -33,9 +31,8 @@ def stripes(seed: int) -> TextureData:
     return texture(np.stack(colors)[band])
 
 
-def perlin_noise(seed: int) -> TextureData:
+def perlin_noise(rng: VariantRng) -> TextureData:
     """Colourful clouds; any scale."""
-    rng = variant_rng("perlin_noise", seed)
     cells = rng.choose((2, 3, 5, 8, 12))
     field = fbm((cells, cells), rng.choose((1, 3, 6)), rng)
     field = 0.5 + 0.5 * np.clip(field / (2.2 * field.std()), -1, 1)
@@ -43,9 +40,8 @@ def perlin_noise(seed: int) -> TextureData:
     return texture(ramp([(i / (count - 1), _vivid(rng)) for i in range(count)], field))
 
 
-def voronoi_noise(seed: int) -> TextureData:
+def voronoi_noise(rng: VariantRng) -> TextureData:
     """Cells of random colours, some with borders; any scale."""
-    rng = variant_rng("voronoi_noise", seed)
     cells = rng.choose((4, 6, 9, 14, 22))
     points = worley((cells, cells), rng)
     palette = np.stack([_vivid(rng) for _ in range(rng.choose((3, 5, 8)))])

@@ -13,7 +13,7 @@ from gen_data.content.procedural.textures.texture_images import (
 )
 from gen_data.core.asset_types import Float32, TextureData
 from gen_data.core.noise import SIZE_PX, fbm, rows_and_columns, smoothstep, worley
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _BRIGHT = ("#d7261e", "#f2a71b", "#f7d423", "#2e9e4f", "#1f6fb5", "#7b3fa0", "#f0f0ec", "#12a3a3")
 # Distance from the centre to the pentagons and hexagons of a truncated icosahedron of edge 1
@@ -21,10 +21,9 @@ _BRIGHT = ("#d7261e", "#f2a71b", "#f7d423", "#2e9e4f", "#1f6fb5", "#7b3fa0", "#f
 _PENTAGON, _HEXAGON = 2.32744, 2.26728
 
 
-def ball_cover(seed: int) -> TextureData:
+def ball_cover(rng: VariantRng) -> TextureData:
     """The cover of ``toys.ball`` of the same seed."""
-    rng = variant_rng("ball_cover", seed)
-    kind = toys.ball_kind(seed)
+    kind = toys.ball_kind(rng.seed)
     if kind == "rubber":
         return texture(draw_color(_BRIGHT, 0.05, rng) * (1 + 0.02 * fbm((8, 8), 3, rng))[..., None])
     make = {"tennis": _tennis, "beach": _beach, "basket": _basket, "foot": _foot}[kind]

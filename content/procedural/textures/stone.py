@@ -20,16 +20,15 @@ from gen_data.core.noise import (
     uniform,
     worley,
 )
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 _UNJOINTED = 4
 """The first seeds of concrete, of which small things are cast, have no joints."""
 
 
-def marble(seed: int) -> TextureData:
+def marble(rng: VariantRng) -> TextureData:
     """Polished marble; 0.8 m per repeat."""
-    rng = variant_rng("marble", seed)
-    ground, vein_color = colors_in_turn("marbles", seed)
+    ground, vein_color = colors_in_turn("marbles", rng.seed)
     strength = rng.between(0.3, 0.65)
     clouds = fbm((3, 3), 5, rng)
     veins = np.zeros_like(clouds)
@@ -42,12 +41,11 @@ def marble(seed: int) -> TextureData:
     return texture(albedo + 0.012 * fbm((64, 64), 2, rng)[..., None], 0.9 + 0.1 * veins)
 
 
-def terrazzo(seed: int) -> TextureData:
+def terrazzo(rng: VariantRng) -> TextureData:
     """Stone chips of 3 to 16 mm in cement, ground flat; 0.6 m per repeat.
 
     Sizes are those of chips No. 1 to 4 of the trade (NTMA; from memory).
     """
-    rng = variant_rng("terrazzo", seed)
     ground = draw_color(PALETTES["cements"], 0.04, rng)
     palette = [color(rng.choose(PALETTES["chips"])) for _ in range(rng.choose((2, 3, 4)))]
     # Chips of most floors are near the tone of their ground.
@@ -67,10 +65,9 @@ def terrazzo(seed: int) -> TextureData:
     return texture(albedo, 1.0 - 0.15 * chips_everywhere)
 
 
-def granite(seed: int) -> TextureData:
+def granite(rng: VariantRng) -> TextureData:
     """Polished granite with grains of 1 to 5 mm, or quartz agglomerate; 0.4 m per repeat."""
-    rng = variant_rng("granite", seed)
-    ground, other, dark = colors_in_turn("granites", seed)
+    ground, other, dark = colors_in_turn("granites", rng.seed)
     # Agglomerates are nearly plain.
     strength = rng.choose((0.25, 0.7, 1.0))
     grains, mica = worley((110, 110), rng), worley((150, 150), rng)
@@ -86,20 +83,19 @@ def granite(seed: int) -> TextureData:
     return texture(albedo + 0.012 * (kind - 0.5)[..., None], 0.95 + 0.05 * specks)
 
 
-def concrete(seed: int) -> TextureData:
+def concrete(rng: VariantRng) -> TextureData:
     """Cast concrete: clouds, few bug holes, joints of the formwork; 2 m per repeat.
 
     Tones of fair-faced concrete vary by a few percent, pores of 2 to 15 mm cover 0.3 to 1.2 % of it
     (DBV and VDZ, "Sichtbeton", classes P4 to P1; from memory), most of them below 6 mm; a texel is
     4 mm. Grey cement is nearly neutral.
     """
-    rng = variant_rng("concrete", seed)
-    base = color(in_turn(PALETTES["concretes"], seed))
+    base = color(in_turn(PALETTES["concretes"], rng.seed))
     clouds, fine = fbm((3, 3), 5, rng, 0.55), fbm((64, 64), 3, rng, 0.7)
     # Fresh concrete runs down its formwork.
     streaks = fbm((2, 24), 3, rng)
     holes = _pores(48, 0.12, 0.1, rng) + _pores(90, 0.16, 0.06, rng)
-    joint = _formwork(rng) if seed >= _UNJOINTED else np.zeros_like(clouds)
+    joint = _formwork(rng) if rng.seed >= _UNJOINTED else np.zeros_like(clouds)
     shade = 1 + rng.between(0.03, 0.07) * clouds + 0.02 * fine + rng.between(0.0, 0.02) * streaks
     shade *= 1 - 0.25 * np.clip(holes, 0, 1) - 0.13 * joint
     height = 0.12 * fine - 0.5 * holes - 0.4 * joint
@@ -123,10 +119,9 @@ def _formwork(rng: VariantRng) -> Float32:
     return ties
 
 
-def screed(seed: int) -> TextureData:
+def screed(rng: VariantRng) -> TextureData:
     """A floor of floated concrete: soft mottling, hairline cracks; 2.5 m per repeat."""
-    rng = variant_rng("screed", seed)
-    base = color(in_turn(PALETTES["concretes"], seed))
+    base = color(in_turn(PALETTES["concretes"], rng.seed))
     clouds, mottling = fbm((2, 2), 5, rng, 0.6), fbm((12, 12), 4, rng, 0.6)
     stains = smoothstep(0.25, 0.9, fbm((4, 4), 5, rng, 0.55))
     cells = worley((2, 2), rng, 0.9)
@@ -140,9 +135,8 @@ def screed(seed: int) -> TextureData:
     return texture(base * shade[..., None], rough, 0.08 * mottling - crack)
 
 
-def plaster(seed: int) -> TextureData:
+def plaster(rng: VariantRng) -> TextureData:
     """Painted wall plaster, floated smooth to sanded; 1.5 m per repeat."""
-    rng = variant_rng("plaster", seed)
     base = draw_color(PALETTES["plasters"], 0.03, rng)
     grain = fbm((128, 128), 2, rng, 0.8)
     strokes = fbm((6, 9), 5, rng, 0.6)
@@ -151,16 +145,15 @@ def plaster(seed: int) -> TextureData:
     return texture(base * shade[..., None], None, 0.25 * rough * grain + 0.15 * strokes)
 
 
-def paint(seed: int) -> TextureData:
+def paint(rng: VariantRng) -> TextureData:
     """White wall paint, for any tint: the stipple of a roller, or woodchip; 1.2 m per repeat.
 
     Rollers leave waves of 1 to 3 mm, 0.1 mm high; chips of woodchip paper are 2 to 8 mm long.
     """
-    rng = variant_rng("paint", seed)
     stipple, wide = fbm((160, 160), 2, rng, 0.7), fbm((3, 3), 5, rng, 0.6)
     shade = 0.96 + rng.between(0.006, 0.012) * wide + 0.009 * stipple
     height = rng.between(0.03, 0.1) * stipple + rng.between(0.05, 0.15) * fbm((10, 10), 3, rng)
-    if seed % 8 == 7:
+    if rng.seed % 8 == 7:
         chips = worley((110, 90), rng)
         raised = chips.of_each((uniform(chips.count, rng) < 0.35).astype(np.float64))
         height += 0.45 * blur_image(raised * smoothstep(0.7, 0.2, chips.nearest))
@@ -168,9 +161,8 @@ def paint(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), 0.97 + 0.03 * stipple, height)
 
 
-def brick(seed: int) -> TextureData:
+def brick(rng: VariantRng) -> TextureData:
     """A wall in running bond; 1 m per repeat."""
-    rng = variant_rng("brick", seed)
     courses, per_course = rng.choose(((12, 4), (14, 5), (10, 4)))
     edge, number = _courses(courses, per_course, 0.5, rng)
     joint = rng.between(2.5, 4.5)
@@ -195,19 +187,17 @@ _WALL_TILES_CM = ((10, 10), (7.5, 15), (15, 15), (20, 20), (30, 60), (20, 40), (
 _FLOOR_TILES_CM = ((30, 30), (60, 60), (30, 60), (20, 20), (60, 60), (40, 40), (30, 60), (15, 15))
 
 
-def tiles(seed: int) -> TextureData:
+def tiles(rng: VariantRng) -> TextureData:
     """Wall tiles with grout, most of them white and glossy; 1.2 m per repeat."""
-    rng = variant_rng("tiles", seed)
-    tall, wide = in_turn(_WALL_TILES_CM, seed)
+    tall, wide = in_turn(_WALL_TILES_CM, rng.seed)
     glossy = tall < 25 or rng.chance(0.5)
-    return _tiled(rng, tall, wide, "wall_tiles", seed, 0.22 if glossy else 0.45)
+    return _tiled(rng, tall, wide, "wall_tiles", rng.seed, 0.22 if glossy else 0.45)
 
 
-def floor_tiles(seed: int) -> TextureData:
+def floor_tiles(rng: VariantRng) -> TextureData:
     """Floor tiles with grout, plain or like stone, some checkered; 1.2 m per repeat."""
-    rng = variant_rng("floor_tiles", seed)
-    tall, wide = in_turn(_FLOOR_TILES_CM, seed)
-    return _tiled(rng, tall, wide, "floor_tiles", seed, rng.between(0.35, 0.6))
+    tall, wide = in_turn(_FLOOR_TILES_CM, rng.seed)
+    return _tiled(rng, tall, wide, "floor_tiles", rng.seed, rng.between(0.35, 0.6))
 
 
 def _tiled(

@@ -21,15 +21,14 @@ from gen_data.core.noise import (
     warp_image,
     worley,
 )
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 
-def fabric(seed: int) -> TextureData:
+def fabric(rng: VariantRng) -> TextureData:
     """Plain or twill weave, plain-coloured, striped or checked; 0.15 m per repeat.
 
     Yarns of 1.2 mm, those of furnishing fabrics; clothes have finer ones.
     """
-    rng = variant_rng("fabric", seed)
     yarns = rng.choose((96, 128, 128))
     twill = rng.chance(0.4)
     y, x = rows_and_columns()
@@ -49,12 +48,11 @@ def fabric(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), None, relief)
 
 
-def carpet(seed: int) -> TextureData:
+def carpet(rng: VariantRng) -> TextureData:
     """Cut or looped pile of one colour, some with a faint fleck; 0.5 m per repeat.
 
     Tufts are 3 to 5 mm apart: gauges of 1/8 to 3/16 inch.
     """
-    rng = variant_rng("carpet", seed)
     cells = rng.choose((100, 128, 160))
     tufts = worley((cells, cells), rng, 0.9)
     base, fleck = (draw_color(PALETTES["carpets"], 0.04, rng) for _ in range(2))
@@ -69,9 +67,8 @@ def carpet(seed: int) -> TextureData:
     return texture(albedo, None, 0.8 * depth + 0.3 * tone)
 
 
-def leather(seed: int) -> TextureData:
+def leather(rng: VariantRng) -> TextureData:
     """Grained leather, its pebbles 1 to 2 mm wide; 0.2 m per repeat."""
-    rng = variant_rng("leather", seed)
     cells = rng.choose((96, 128, 150))
     grain = worley((cells, cells), rng, 0.95)
     bend = 2.0 * fbm((16, 16), 3, rng)
@@ -83,9 +80,8 @@ def leather(seed: int) -> TextureData:
     return texture(albedo, 0.95 - 0.08 * pebble, 0.45 * pebble + 0.5 * fbm((12, 12), 3, rng))
 
 
-def cardboard(seed: int) -> TextureData:
+def cardboard(rng: VariantRng) -> TextureData:
     """Brown corrugated board; 0.5 m per repeat."""
-    rng = variant_rng("cardboard", seed)
     base = draw_color(("#b39470", "#a98a66", "#bc9f7b", "#c4a988", "#a2825f"), 0.04, rng)
     _, x = rows_and_columns()
     flutes = np.sin(2 * np.pi * rng.choose((64, 80)) * x) + 0 * x.T
@@ -116,9 +112,8 @@ def _yarn_colors(yarns: int, rng: VariantRng) -> tuple[Float32, Float32]:
     return warp * tone, weft * tone
 
 
-def brushed_metal(seed: int) -> TextureData:
+def brushed_metal(rng: VariantRng) -> TextureData:
     """Brushed sheet, strokes across the image; 0.3 m per repeat."""
-    rng = variant_rng("brushed_metal", seed)
     strokes = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
     for cells, weight in (((256, 2), 0.6), ((128, 4), 0.5), ((512, 8), 0.5), ((64, 1), 0.3)):
         strokes += weight * perlin(cells, rng)
@@ -128,9 +123,8 @@ def brushed_metal(seed: int) -> TextureData:
     return texture(base * shade[..., None], 0.75 + 0.1 * strokes + 0.04 * clouds, 0.1 * strokes)
 
 
-def painted_metal(seed: int) -> TextureData:
+def painted_metal(rng: VariantRng) -> TextureData:
     """Lacquered sheet with chips, scratches and grime; 0.6 m per repeat."""
-    rng = variant_rng("painted_metal", seed)
     paint = draw_color(PALETTES["metal_paints"], 0.06, rng)
     peel, grime = fbm((90, 90), 2, rng), smoothstep(0.0, 0.9, fbm((3, 3), 5, rng, 0.6))
     wear = rng.between(0.55, 0.95)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gen_data.content.procedural.textures.texture_images import colors_in_turn, mix_colors, texture
 from gen_data.core.asset_types import Float32, TextureData
 from gen_data.core.noise import SIZE_PX, fbm, perlin, rows_and_columns, smoothstep, uniform
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 Numbers = NDArray[np.int64]
 
@@ -46,10 +46,9 @@ class _Laid:
     length_px: float = SIZE_PX
 
 
-def wood_grain(seed: int) -> TextureData:
+def wood_grain(rng: VariantRng) -> TextureData:
     """Veneer or a glued panel; 0.5 m per repeat across the grain, up to twice that along it."""
-    rng = variant_rng("wood_grain", seed)
-    light, dark = colors_in_turn("timber", seed)
+    light, dark = colors_in_turn("timber", rng.seed)
     staves = rng.choose((2, 3, 4, 4, 5))
     y, x = rows_and_columns()
     number = np.floor(y * staves).astype(np.int64)
@@ -65,14 +64,13 @@ def wood_grain(seed: int) -> TextureData:
     return texture(albedo, 0.88 + 0.12 * fibre, -0.3 * fibre)
 
 
-def wood_planks(seed: int) -> TextureData:
+def wood_planks(rng: VariantRng) -> TextureData:
     """A floor of planks with staggered ends, or of blocks in herringbone; 1.6 m per repeat.
 
     Parquet and planks are 70 to 200 mm wide and 0.4 to 2 m long: usual sizes in shops.
     """
-    rng = variant_rng("wood_planks", seed)
-    light, dark = colors_in_turn("timber", seed)
-    laid = _herringbone(5, 2) if seed in _HERRINGBONE else _staggered(rng)
+    light, dark = colors_in_turn("timber", rng.seed)
+    laid = _herringbone(5, 2) if rng.seed in _HERRINGBONE else _staggered(rng)
     texel_mm = 1000 * _FLOOR_M / SIZE_PX
     rings = _rings(laid, texel_mm, rng)
     fibre = _cut_boards(_fibre(rng) + 0.6 * fbm((24, 2), 2, rng), laid, texel_mm, rng)

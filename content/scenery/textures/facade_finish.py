@@ -4,20 +4,19 @@ import numpy as np
 
 from gen_data.content.procedural.textures.texture_images import color, mix_colors, texture
 from gen_data.core import asset_types, noise
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 PLASTER_WIDTH_M = 8.0
 """One repeat of ``weathered_plaster`` along a wall."""
 
 
-def weathered_plaster(seed: int) -> asset_types.TextureData:
+def weathered_plaster(rng: VariantRng) -> asset_types.TextureData:
     """A whole wall from its foot to its eaves; repeats to the sides only.
 
     Rain leaves streaks below the eaves, splashes darken and green the foot, patches have another
     tone, and render is missing from the oldest. Age rises with the seed modulo 8.
     """
-    rng = variant_rng("weathered_plaster", seed)
-    age = (seed % 8) / 7.0
+    age = (rng.seed % 8) / 7.0
     y, x = noise.rows_and_columns()
     grain, clouds = noise.fbm((96, 96), 3, rng, 0.75), noise.fbm((3, 4), 5, rng, 0.6)
     shade = 0.93 + 0.02 * grain + (0.03 + 0.05 * age) * clouds
@@ -50,9 +49,8 @@ def weathered_plaster(seed: int) -> asset_types.TextureData:
     return texture(albedo.astype(np.float32), None, height.astype(np.float32), 0.8)
 
 
-def wall_boards(seed: int) -> asset_types.TextureData:
+def wall_boards(rng: VariantRng) -> asset_types.TextureData:
     """Painted boards; upright for odd seeds, else weatherboarding. 2 m per repeat."""
-    rng = variant_rng("wall_boards", seed)
     count = rng.choose((12, 14, 16))
     y, x = noise.rows_and_columns()
     across = y * count + 0.0 * x
@@ -64,15 +62,14 @@ def wall_boards(seed: int) -> asset_types.TextureData:
     joint = noise.smoothstep(0.9, 0.97, down)
     shade = tone * (1.0 + 0.05 * grain) * (1.0 - 0.6 * joint) * (1.0 - 0.15 * worn)
     height = 5.0 * down * (1.0 - joint) + 0.6 * grain
-    if seed % 2:
+    if rng.seed % 2:
         shade, height = shade.T, height.T
     albedo = shade[..., None] * np.array([1.0, 0.99, 0.97])
     return texture(albedo.astype(np.float32), None, height.astype(np.float32), 0.7)
 
 
-def profiled_sheet(seed: int) -> asset_types.TextureData:
+def profiled_sheet(rng: VariantRng) -> asset_types.TextureData:
     """Trapezoidal or standing-seam sheet, ribs upright, with streaks of rain. 2 m per repeat."""
-    rng = variant_rng("profiled_sheet", seed)
     count = rng.choose((4, 8, 10, 16))
     y, x = noise.rows_and_columns()
     along = x * count + 0.0 * y
@@ -89,9 +86,8 @@ def profiled_sheet(seed: int) -> asset_types.TextureData:
     return texture(albedo.astype(np.float32), None, 6.0 * noise.blur_image(rib, 2), 1.0)
 
 
-def slates(seed: int) -> asset_types.TextureData:
+def slates(rng: VariantRng) -> asset_types.TextureData:
     """Slates or bitumen shingles, the eaves below; 1.8 m per repeat."""
-    rng = variant_rng("slates", seed)
     courses, per_course = rng.choose(((9, 6), (10, 8), (12, 8)))
     y, x = noise.rows_and_columns()
     row = np.floor(y * courses).astype(np.int64)

@@ -251,9 +251,8 @@ def draw_blade(
     cover[window] = np.maximum(cover[window], edge)
 
 
-def window_grid(seed: int) -> TextureData:
+def window_grid(rng: VariantRng) -> TextureData:
     """Four storeys of four bays of a plain facade far away; the pattern repeats."""
-    rng = variant_rng("window_grid", seed)
     n, cells = 256, 4
     centre = (np.arange(n) + 0.5) / n * cells
     cell, at = np.floor(centre).astype(np.int64), centre - np.floor(centre)
@@ -275,9 +274,8 @@ _FIELDS = ("#667840", "#73854a", "#5c6e3d", "#998f5c", "#7d6b52", "#858c4f", "#6
 """Meadow, pasture, ripe grain and ploughed earth, sRGB."""
 
 
-def farmland(seed: int) -> TextureData:
+def farmland(rng: VariantRng) -> TextureData:
     """Meadows, ploughed and ripe fields with hedgerows between them, seen from afar; tiles."""
-    rng = variant_rng("farmland", seed)
     n, rows = 512, 6
     y, x = ((np.arange(n) + 0.5) / n * rows for _ in range(2))
     wave = 0.16 * np.sin(2 * np.pi * (x / rows + rng.between(0, 1)))[None, :]

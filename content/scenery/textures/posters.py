@@ -10,7 +10,7 @@ from gen_data.config.data_files import load_table
 from gen_data.content.procedural.material_presets import hex_to_srgb8
 from gen_data.content.procedural.textures import artwork as art
 from gen_data.core.asset_types import TextureData
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, in_turn
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -20,12 +20,11 @@ if TYPE_CHECKING:
 _WORDS = load_table(__package__, "posters", tuple[str, ...])
 
 
-def poster(seed: int) -> TextureData:
+def poster(rng: VariantRng) -> TextureData:
     """A poster, upright, drawn at 1 to 1.41; 256 x 362."""
-    rng = variant_rng("poster", seed)
-    colors = _colors(_WORDS["schemes"], seed)
+    colors = _colors(_WORDS["schemes"], rng.seed)
     image = art.canvas(512, 724, colors[0])
-    (_skyline, _discs, _hills, _bottle)[seed % 4](image, colors, rng)
+    (_skyline, _discs, _hills, _bottle)[rng.seed % 4](image, colors, rng)
     ink = colors[2]
     art.text(image, (0.06, 0.05, 0.94, 0.2), rng.choose(_WORDS["titles"]), ink, 3)
     art.text(image, (0.1, 0.8, 0.9, 0.88), rng.choose(_WORDS["lines"]), ink, 2)
@@ -35,12 +34,11 @@ def poster(seed: int) -> TextureData:
     return art.resize_texture(image, 256, 362)
 
 
-def wide_poster(seed: int) -> TextureData:
+def wide_poster(rng: VariantRng) -> TextureData:
     """An advertisement for a hoarding, drawn at 1.41 to 1; 512 x 362."""
-    rng = variant_rng("wide_poster", seed)
-    colors = _colors(_WORDS["schemes"], seed + 3)
+    colors = _colors(_WORDS["schemes"], rng.seed + 3)
     image = art.canvas(1024, 724, colors[0])
-    (_hills, _skyline, _discs)[seed % 3](image, colors, rng)
+    (_hills, _skyline, _discs)[rng.seed % 3](image, colors, rng)
     x0, x1 = (0.04, 0.58) if rng.chance(0.5) else (0.42, 0.96)
     art.text(image, (x0, 0.08, x1, 0.34), rng.choose(_WORDS["brands"]), colors[2], 5)
     art.text(image, (x0, 0.38, x1, 0.48), rng.choose(_WORDS["lines"]), colors[2], 2)

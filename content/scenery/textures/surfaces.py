@@ -4,13 +4,12 @@ import numpy as np
 
 from gen_data.content.procedural.textures.texture_images import texture
 from gen_data.core import asset_types, noise
-from gen_data.core.variant_rng import variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 
-def roof_tiles(seed: int) -> asset_types.TextureData:
+def roof_tiles(rng: VariantRng) -> asset_types.TextureData:
     """Clay or concrete tiles, the eaves below; 1.8 m per repeat."""
-    rng = variant_rng("roof_tiles", seed)
-    courses, per_course = (6, 8) if seed % 2 == 0 else (8, 10)
+    courses, per_course = (6, 8) if rng.seed % 2 == 0 else (8, 10)
     y, x = noise.rows_and_columns()
     row = np.floor(y * courses).astype(np.int64)
     down = y * courses - row
@@ -33,9 +32,8 @@ def roof_tiles(seed: int) -> asset_types.TextureData:
     )
 
 
-def ashlar(seed: int) -> asset_types.TextureData:
+def ashlar(rng: VariantRng) -> asset_types.TextureData:
     """Dressed stone blocks with thin joints; 2.4 m per repeat."""
-    rng = variant_rng("ashlar", seed)
     courses, per_course = 6, 4
     y, x = noise.rows_and_columns()
     row = np.floor(y * courses).astype(np.int64)
@@ -54,9 +52,8 @@ def ashlar(seed: int) -> asset_types.TextureData:
     return texture(albedo.astype(np.float32), None, height.astype(np.float32))
 
 
-def bark(seed: int) -> asset_types.TextureData:
+def bark(rng: VariantRng) -> asset_types.TextureData:
     """Furrowed bark, the trunk upright; 0.8 m per repeat."""
-    rng = variant_rng("bark", seed)
     bend = 14.0 * noise.fbm((5, 4), 4, rng)
     ridge = np.abs(noise.fbm((4, 12), 4, rng, 0.55))
     furrow = noise.smoothstep(0.2, 0.02, noise.warp_image(ridge, 0 * bend, bend))
@@ -68,9 +65,8 @@ def bark(seed: int) -> asset_types.TextureData:
     return texture(albedo.astype(np.float32), None, noise.blur_image(height.astype(np.float32)))
 
 
-def foliage(seed: int) -> asset_types.TextureData:
+def foliage(rng: VariantRng) -> asset_types.TextureData:
     """Dense small leaves, as of a clipped hedge; 0.8 m per repeat."""
-    rng = variant_rng("foliage", seed)
     shade = np.full((512, 512), 0.12, dtype=np.float32)
     height = np.zeros((512, 512), dtype=np.float32)
     for cells, level in ((14, 0.35), (20, 0.6), (26, 0.95)):
@@ -84,10 +80,9 @@ def foliage(seed: int) -> asset_types.TextureData:
     return texture(albedo.astype(np.float32), None, noise.blur_image(height))
 
 
-def produce(seed: int) -> asset_types.TextureData:
+def produce(rng: VariantRng) -> asset_types.TextureData:
     """Round fruit or vegetables of one size beside each other in a heap; 0.56 m per repeat."""
-    rng = variant_rng("produce", seed)
-    across = (8, 10, 7, 12)[seed % 4]
+    across = (8, 10, 7, 12)[rng.seed % 4]
     points = noise.worley((across, across), rng, 0.45)
     # A ball's height over the gap; each fruit hides a part of its neighbours.
     height = np.sqrt(np.maximum(1.0 - (points.nearest / 0.72) ** 2, 0.0)).astype(np.float32)

@@ -13,7 +13,7 @@ from gen_data.content.procedural.material_presets import hex_to_srgb8
 from gen_data.content.procedural.textures import artwork as art
 from gen_data.core.asset_types import TextureData
 from gen_data.core.noise import fbm, smoothstep
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -23,9 +23,8 @@ BOARDS, ADVERTS = 4, 2
 _WORDS = load_table(__package__, "shop_signs", tuple[str, ...])
 
 
-def shop_sign(seed: int) -> TextureData:
+def shop_sign(rng: VariantRng) -> TextureData:
     """Four boards above one another, each four times as wide as it is high."""
-    rng = variant_rng("shop_sign", seed)
     sheet = art.canvas(1024, 1024, (0, 0, 0))
     for row in range(BOARDS):
         sheet.paste(_board(rng), (0, 256 * row))
@@ -58,9 +57,8 @@ def _board(rng: VariantRng) -> "Image":
     return image
 
 
-def wall_advert(seed: int) -> TextureData:
+def wall_advert(rng: VariantRng) -> TextureData:
     """Four square adverts: shapes in strong colours, a large word, small print."""
-    rng = variant_rng("wall_advert", seed)
     sheet = art.canvas(1024, 1024, (0, 0, 0))
     for k in range(ADVERTS**2):
         sheet.paste(_advert(rng), (512 * (k % ADVERTS), 512 * (k // ADVERTS)))
@@ -91,9 +89,8 @@ def _advert(rng: VariantRng) -> "Image":
     return image
 
 
-def graffiti(seed: int) -> TextureData:
+def graffiti(rng: VariantRng) -> TextureData:
     """A painted piece: letters with outlines before a cloud of colour, over the whole image."""
-    rng = variant_rng("graffiti", seed)
     cloud, fill, edge = (hex_to_srgb8(code) for code in rng.choose(_PAINTS).split())
     image = art.canvas(1024, 512, cloud)
     draw = art.pen(image)
