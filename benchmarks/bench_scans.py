@@ -65,7 +65,11 @@ REAL = {
     "points on a car at 20 m": 210.0,
     "points on a car at 40 m": 33.0,
     "points on a pedestrian at 10 m": 262.0,
+    "points on a pedestrian at 20 m": 79.0,
+    "points on a pedestrian at 40 m": 24.0,
     "points on a cyclist at 10 m": 546.0,
+    "points on a cyclist at 20 m": 107.0,
+    "points on a cyclist at 40 m": 21.0,
     "range of 99.9 % [m]": 73.0,
     "highest beam [deg]": 3.7,
 }
@@ -287,10 +291,8 @@ def _ground(p_m: Float64) -> tuple[NDArray[np.intp], Float64]:
     return np.concatenate(indices), np.concatenate(residuals_m)
 
 
-POINTS_AT = (
-    *(("car", range_m) for range_m in (10.0, 20.0, 40.0)),
-    ("pedestrian", 10.0),
-    ("cyclist", 10.0),
+POINTS_AT = tuple(
+    (kind, range_m) for kind in ("car", "pedestrian", "cyclist") for range_m in (10.0, 20.0, 40.0)
 )
 
 

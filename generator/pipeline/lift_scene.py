@@ -5,7 +5,8 @@ four rules:
 
 - Ground surfaces, and lines that hang from masts, are bent point by point (``assets/drape.py``).
 - Buildings stay level at the height of the ground before their fronts, on a base that reaches down
-  to the lowest ground below them.
+  to the lowest ground below them. Detached houses behind gardens stand as high as the higher end of
+  their front, and stairs lead down from the door.
 - Vehicles, and objects that are wider than high, turn with the plane through four points of the
   ground: below the wheels, or below the corners. Cameras on driving lanes belong to a vehicle.
 - All others stay upright: people at the height of the ground below their middle, objects at
@@ -16,7 +17,7 @@ lane, and keeps its motion.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
@@ -32,7 +33,7 @@ from gen_data.core.scene import Body, Camera, Lane, Light, Scene
 from gen_data.core.se3 import SE3, Array, Vec3
 from gen_data.traffic.axles import find_axles
 
-Stance = Literal["tilted", "upright", "centred", "built", "flown"]
+Stance = Literal["tilted", "upright", "centred", "built", "raised", "flown"]
 _FOOT_MAX_M = 1.5
 """Half extents of what stands upright are cut to this: crowns of trees hang over other ground."""
 _CAR_M = (2.7, 1.5)
@@ -42,14 +43,23 @@ _STOREY_M = 1.0
 _BASE_STEP_M, _SUNK_M, _INSET_M = 0.5, 0.05, 0.02
 """Depths of bases are multiples of the first; they reach below the lowest ground by the second, and
 are narrower than the building by the third."""
+_STAIRS_M, _STEPS_FROM_M, _STEPS_UNIT_M = 1.4, 0.05, 0.05
+"""Width of stairs before doors; height from which on there are any; their heights are multiples of
+the last."""
+_ALLEY = frozenset({"garden", "frontage"})
+"""Lanes on which stairs may stand."""
 # Without a texture, which further views of a scene would have to fetch.
 _CONCRETE = asset_types.Material((0.36, 0.35, 0.33), 0.9, role="facade")
 _TURN = 5e-4
 """Points of a lane are kept where its grade has changed by this much since the last one."""
 _TWIST = 1e-3
 """Cross slopes of a lane that change by less than this are one."""
+STAIRS = "stairs_m"
+"""Families of houses that may have stairs before their doors declare under this name how far those
+reach at most."""
 _FLYING = frozenset({"drone", "gimbal"})
 _HOUSES = frozenset({"building", "garage"})
+_BUILT: frozenset[Stance] = frozenset({"built", "raised"})
 
 
 def lift_scene(scene: Scene, assets: AssetLibrary) -> Scene:
@@ -164,7 +174,7 @@ def _lift_bodies(
         body.name: first[body.instance_id] if body.instance_id else body for body in scene.bodies
     }
     standing = [b for b in scene.bodies if leaders[b.name] is b and not _is_draped(b)]
-    feet = [_foot(body, assets) for body in standing]
+    feet = [_in_garden(_foot(body, assets), body, scene, assets) for body in standing]
     corners = np.concatenate(
         [foot.corners([b.T_world_body]) for foot, b in zip(feet, standing, strict=True)]
         or [np.zeros((0, 4, 3))]
@@ -186,8 +196,9 @@ def _lift_bodies(
             moves[body.name] = move
             bodies.append(replace(body, T_world_body=(move @ body.T_world_body).rounded()))
     for body, foot, z in zip(standing, feet, heights, strict=True):
-        if foot.stance == "built" and np.ptp(z) > 0.0:
+        if foot.stance in _BUILT and np.ptp(z) > 0.0:
             bodies += _base(body, foot, z, assets)
+            bodies += _stairs(body, foot, z, relief, assets)
     return tuple(bodies), moves
 
 
@@ -203,8 +214,8 @@ def _move(stance: Stance, corners: Array, z: Array, sky_m: float) -> SE3:
         return SE3((0.0, 0.0, sky_m))
     if stance == "upright":
         return SE3((0.0, 0.0, float(z.min())))
-    if stance == "built":
-        return SE3((0.0, 0.0, float(0.5 * (z[2] + z[3]))))
+    if stance in _BUILT:
+        return SE3((0.0, 0.0, _floor_m(stance, z)))
     if stance == "centred":
         return SE3((0.0, 0.0, float(z.mean())))
     return _tilt(corners, z)
@@ -234,7 +245,7 @@ def _tilt(corners: Array, z: Array) -> SE3:
 
 def _base(body: Body, foot: _Foot, z: Array, assets: AssetLibrary) -> list[Body]:
     """A block below a building whose floor is above the lowest ground; none if nothing is open."""
-    floor_m = float(0.5 * (z[2] + z[3]))
+    floor_m = _floor_m(foot.stance, z)
     depth_m = math.ceil((floor_m - float(z.min()) + _SUNK_M) / _BASE_STEP_M) * _BASE_STEP_M
     length_m, width_m = (round(b - a - _INSET_M, 2) for a, b in (foot.x_m, foot.y_m))
     if floor_m - float(z.min()) < _SUNK_M or min(length_m, width_m) <= 0.0:
@@ -245,6 +256,50 @@ def _base(body: Body, foot: _Foot, z: Array, assets: AssetLibrary) -> list[Body]
     pose = SE3((0.0, 0.0, floor_m)) @ body.T_world_body @ SE3(middle)
     name = f"{body.name}/base"
     return [Body(name, asset, pose.rounded(), collides=False, materials=(_CONCRETE,))]
+
+
+def _floor_m(stance: Stance, z: Array) -> float:
+    """Height of the ground floor of a building, by the ground at its corners [4]."""
+    return float(max(z[2], z[3]) if stance == "raised" else 0.5 * (z[2] + z[3]))
+
+
+def _in_garden(foot: _Foot, body: Body, scene: Scene, assets: AssetLibrary) -> _Foot:
+    """The foot of a house whose family has stairs, raised if its garden has room for them."""
+    room_m = families.declared(body.asset, STAIRS, None) if foot.stance == "built" else None
+    if room_m is None:
+        return foot
+    ends = [
+        body.T_world_body.apply((np.asarray(door) * body.scale) + (room_m, 0.0, 0.0))[:2]
+        for door in _doors(body, assets)
+    ]
+    others = [lane for lane in scene.lanes if lane.kind not in _ALLEY]
+    is_free = bool(ends) and not any(_is_on(end, lane) for end in ends for lane in others)
+    return replace(foot, stance="raised") if is_free else foot
+
+
+def _doors(body: Body, assets: AssetLibrary) -> list[Vec3]:
+    return [k.position_m for k in assets.keypoints(body.asset) if k.name == "door"]
+
+
+def _stairs(
+    body: Body, foot: _Foot, z: Array, relief: Relief, assets: AssetLibrary
+) -> Iterator[Body]:
+    """Stairs from the doors of a raised house down to the ground before them."""
+    if foot.stance != "raised":
+        return
+    lifted = SE3((0.0, 0.0, _floor_m(foot.stance, z))) @ body.T_world_body
+    for number, door in enumerate(_doors(body, assets)):
+        at = lifted @ SE3((body.scale * door[0], body.scale * door[1], 0.0))
+        rise_m = at.translation_m[2] - float(relief.height(np.array([at.translation_m]))[0])
+        if rise_m < _STEPS_FROM_M:
+            continue
+        # The lowest step lies in the ground, which slopes along the stairs' width.
+        high_m = (math.ceil(rise_m / _STEPS_UNIT_M) + 2) * _STEPS_UNIT_M
+        values = {"rise_m": round(high_m, 2), "width_m": _STAIRS_M}
+        pose = (at @ SE3((0.0, 0.0, -high_m))).rounded()
+        asset = str(asset_ids.AssetId("door_stairs", values))
+        name = f"{body.name}/stairs{number}"
+        yield Body(name, asset, pose, collides=False, materials=(_CONCRETE,))
 
 
 def _rise(pose: SE3, relief: Relief) -> SE3:
