@@ -18,7 +18,8 @@ HDL-64E S2. Definitions, the same for all sources:
   object itself instead of those in its box, below 0.2 m too, and is known for our scans only.
 
   The line is no count. KITTI's 546 on a cyclist at 10 m is more than the beams that touch any of
-  ours there (``benchmarks/bench_silhouettes.py``): 378 from behind, 512 from the side.
+  ours there: 378 from behind, 512 from the side. Of people far away, KITTI labels those that its
+  annotators recognised; ours count from one point on.
 * **highest beam**: the 99.5th percentile of elevations, about the scanner's origin in the axes of
   the car.
 """

@@ -17,7 +17,7 @@ lane, and keeps its motion.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
@@ -73,7 +73,7 @@ def lift_scene(scene: Scene, assets: AssetLibrary) -> Scene:
     lanes = tuple(_lifted_lane(lane, relief) for lane in scene.lanes)
     heights_m = [point[2] for lane in lanes for point in lane.center_m] or [0.0]
     sky_m = max(heights_m)
-    bodies, moves = _lift_bodies(scene, assets, relief, sky_m)
+    bodies, moves = _lift_bodies(scene.bodies, scene.lanes, assets, relief, sky_m)
     tracks = tuple(
         _lifted_track(track, scene.body(track.body), assets, relief, sky_m)
         for track in scene.tracks
@@ -162,19 +162,26 @@ def _scaled(bounds_m: tuple[Vec3, Vec3], scale: float) -> tuple[Vec3, Vec3]:
     return (scale * x0, scale * y0, scale * z0), (scale * x1, scale * y1, scale * z1)
 
 
+@lru_cache(maxsize=2)
 def _lift_bodies(
-    scene: Scene, assets: AssetLibrary, relief: Relief, sky_m: float
-) -> tuple[tuple[Body, ...], dict[str, SE3]]:
-    """The bodies on the relief, with the bases of buildings, and their moves by name."""
+    level: tuple[Body, ...],
+    lanes: tuple[Lane, ...],
+    assets: AssetLibrary,
+    relief: Relief,
+    sky_m: float,
+) -> tuple[tuple[Body, ...], Mapping[str, SE3]]:
+    """The bodies on the relief, with the bases of buildings, and their moves by name.
+
+    All views of a scene have the same ones.
+    """
     # All bodies of an instance, such as a person with an umbrella, move as its first one does.
     first: dict[int, Body] = {}
-    for body in scene.bodies:
+    for body in level:
         first.setdefault(body.instance_id, body)
-    leaders = {
-        body.name: first[body.instance_id] if body.instance_id else body for body in scene.bodies
-    }
-    standing = [b for b in scene.bodies if leaders[b.name] is b and not _is_draped(b)]
-    feet = [_in_garden(_foot(body, assets), body, scene, assets) for body in standing]
+    leaders = {body.name: first[body.instance_id] if body.instance_id else body for body in level}
+    standing = [b for b in level if leaders[b.name] is b and not _is_draped(b)]
+    ways = _Ways.of(lane for lane in lanes if lane.kind not in _ALLEY)
+    feet = [_in_garden(_foot(body, assets), body, ways, assets) for body in standing]
     corners = np.concatenate(
         [foot.corners([b.T_world_body]) for foot, b in zip(feet, standing, strict=True)]
         or [np.zeros((0, 4, 3))]
@@ -185,7 +192,7 @@ def _lift_bodies(
         for body, foot, points, z in zip(standing, feet, corners, heights, strict=True)
     }
     bodies: list[Body] = []
-    for body in scene.bodies:
+    for body in level:
         if _is_draped(body):
             parsed = asset_ids.parse_asset_id(body.asset)
             asset = drape.draped_id(parsed, body.T_world_body, body.scale, relief)
@@ -263,7 +270,39 @@ def _floor_m(stance: Stance, z: Array) -> float:
     return float(max(z[2], z[3]) if stance == "raised" else 0.5 * (z[2] + z[3]))
 
 
-def _in_garden(foot: _Foot, body: Body, scene: Scene, assets: AssetLibrary) -> _Foot:
+@dataclass(frozen=True, eq=False, slots=True)
+class _Ways:
+    """The pieces of the middles of lanes in plan, and half their widths.
+
+    Attributes:
+        start_m, step_m: [n, 2].
+        half_m: [n].
+    """
+
+    start_m: Array
+    step_m: Array
+    half_m: Array
+
+    @classmethod
+    def of(cls, lanes: Iterable[Lane]) -> "_Ways":
+        """The pieces of all lanes."""
+        lines = [(np.asarray(lane.center_m)[:, :2], 0.5 * lane.width_m) for lane in lanes]
+        none = np.zeros((0, 2))
+        return cls(
+            np.concatenate([none, *(line[:-1] for line, _ in lines)]),
+            np.concatenate([none, *(np.diff(line, axis=0) for line, _ in lines)]),
+            np.concatenate([none[:, 0], *(np.full(len(line) - 1, w) for line, w in lines)]),
+        )
+
+    def reach(self, place_m: Array) -> bool:
+        """Whether a place is on any of the lanes."""
+        away, step = place_m - self.start_m, self.step_m
+        share = (away * step).sum(axis=1) / (step * step).sum(axis=1)
+        off = away - np.clip(share, 0.0, 1.0)[:, None] * step
+        return bool(((off * off).sum(axis=1) <= self.half_m * self.half_m).any())
+
+
+def _in_garden(foot: _Foot, body: Body, ways: _Ways, assets: AssetLibrary) -> _Foot:
     """The foot of a house whose family has stairs, raised if its garden has room for them."""
     room_m = families.declared(body.asset, STAIRS, None) if foot.stance == "built" else None
     if room_m is None:
@@ -272,8 +311,7 @@ def _in_garden(foot: _Foot, body: Body, scene: Scene, assets: AssetLibrary) -> _
         body.T_world_body.apply((np.asarray(door) * body.scale) + (room_m, 0.0, 0.0))[:2]
         for door in _doors(body, assets)
     ]
-    others = [lane for lane in scene.lanes if lane.kind not in _ALLEY]
-    is_free = bool(ends) and not any(_is_on(end, lane) for end in ends for lane in others)
+    is_free = bool(ends) and not any(ways.reach(end) for end in ends)
     return replace(foot, stance="raised") if is_free else foot
 
 
@@ -295,11 +333,12 @@ def _stairs(
             continue
         # The lowest step lies in the ground, which slopes along the stairs' width.
         high_m = (math.ceil(rise_m / _STEPS_UNIT_M) + 2) * _STEPS_UNIT_M
-        values = {"rise_m": round(high_m, 2), "width_m": _STAIRS_M}
+        seed = asset_ids.parse_asset_id(body.asset).parameters.get("seed")
+        stone = seed % 4 if isinstance(seed, int) else 0
+        values = {"rise_m": round(high_m, 2), "width_m": _STAIRS_M, "seed": stone}
         pose = (at @ SE3((0.0, 0.0, -high_m))).rounded()
         asset = str(asset_ids.AssetId("door_stairs", values))
-        name = f"{body.name}/stairs{number}"
-        yield Body(name, asset, pose, collides=False, materials=(_CONCRETE,))
+        yield Body(f"{body.name}/stairs{number}", asset, pose, collides=False)
 
 
 def _rise(pose: SE3, relief: Relief) -> SE3:
@@ -316,7 +355,7 @@ def _lifted_camera(camera: Camera, lanes: Iterable[Lane], relief: Relief) -> Cam
     if camera.rig:
         return camera
     place = np.array(pose.translation_m[:2])
-    if not any(lane.kind == "driving" and _is_on(place, lane) for lane in lanes):
+    if not _Ways.of(lane for lane in lanes if lane.kind == "driving").reach(place):
         return replace(camera, T_world_camera=_raised(pose, relief))
     x, y, _ = pose.rotate(np.array([0.0, 0.0, 1.0])).tolist()
     move = _ridden(pose, math.atan2(y, x), relief)
@@ -332,15 +371,6 @@ def _ridden(pose: SE3, yaw_rad: float, relief: Relief) -> SE3:
     return _tilt(corners, relief.height(corners))
 
 
-def _is_on(place: Array, lane: Lane) -> bool:
-    points = np.asarray(lane.center_m)[:, :2]
-    start, step = points[:-1], np.diff(points, axis=0)
-    share = ((place - start) * step).sum(axis=1) / (step * step).sum(axis=1)
-    nearest = start + np.clip(share, 0.0, 1.0)[:, None] * step
-    off = ((place - nearest) ** 2).sum(axis=1)
-    return bool(off.min() <= (0.5 * lane.width_m) ** 2)
-
-
 def _lifted_track(
     track: motion.Trajectory, body: Body, assets: AssetLibrary, relief: Relief, sky_m: float
 ) -> motion.Trajectory:
@@ -354,7 +384,7 @@ def _lifted_track(
     return replace(track, knots=knots)
 
 
-def _lifted_light(light: Light, moves: dict[str, SE3], relief: Relief) -> Light:
+def _lifted_light(light: Light, moves: Mapping[str, SE3], relief: Relief) -> Light:
     if light.kind == "sun":
         return light
     if light.body in moves:
@@ -367,6 +397,7 @@ def _lifted_light(light: Light, moves: dict[str, SE3], relief: Relief) -> Light:
     return scene_time.moved_light(light, _rise(pose, relief))
 
 
+@lru_cache(maxsize=512)
 def _lifted_lane(lane: Lane, relief: Relief) -> Lane:
     """The lane with its points on the ground, and more of them where that bends."""
     points, given = _refined(np.asarray(lane.center_m, np.float64))

@@ -50,7 +50,9 @@ def test_stairs_lead_from_doors_to_the_ground(slope: tuple[Street, AssetLibrary]
     assert len(found) >= 4
     for house, stairs in found:
         mesh = assets.mesh(stairs.asset)
-        caster = RayCaster((stairs.T_world_body.apply(mesh.vertices_m.astype(np.float64)), mesh.faces))
+        caster = RayCaster(
+            (stairs.T_world_body.apply(mesh.vertices_m.astype(np.float64)), mesh.faces)
+        )
         long_m = float(mesh.vertices_m[:, 0].max())
         way = np.arange(0.05, long_m, 0.05)
         places = stairs.T_world_body.apply(np.column_stack([way, 0.0 * way, 0.0 * way]))

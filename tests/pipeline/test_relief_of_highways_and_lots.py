@@ -6,7 +6,6 @@ The same scene without relief tells how high a lane or a wheel is above level gr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -58,19 +57,19 @@ def _shipped(name: str, given: tuple[str, ...], *scenery: str) -> Pair:
 
 
 @pytest.fixture(scope="module")
-def highway() -> Iterator[Pair]:
-    yield _shipped("highway.yaml", HIGHWAY, "trees", "signs")
+def highway() -> Pair:
+    return _shipped("highway.yaml", HIGHWAY, "trees", "signs")
 
 
 @pytest.fixture(scope="module")
-def lot() -> Iterator[Pair]:
-    yield _shipped("parking.yaml", LOT, "buildings", "lamps", "street_lights")
+def lot() -> Pair:
+    return _shipped("parking.yaml", LOT, "buildings", "lamps", "street_lights")
 
 
 @pytest.fixture(scope="module")
-def crossing() -> Iterator[Pair]:
+def crossing() -> Pair:
     level = tuple(given for given in SIDE if "relief" not in given)
-    yield _hilly_and_level(
+    return _hilly_and_level(
         thin_street("street.yaml", *SIDE), thin_street("street.yaml", *level, without=("relief",))
     )
 
