@@ -115,7 +115,7 @@ def pictures_of_config(name: str, n: int, given: list[str], *, light: bool) -> I
         "exporters=[]",
         "steps_per_scene=1",
     ]
-    kitti = next((e for e in config.exporters if isinstance(e, Kitti)), Kitti(far_m=70))
+    kitti = next((e for e in config.exporters if isinstance(e, Kitti)), Kitti(far_m=64))
     style = kitti.model_copy(update={"low_px": math.ceil(kitti.low_px / shrunk)})
     with open_pipeline(load_config(name, overrides=[*given, *changes])) as pipeline:
         for scene in range(n):

@@ -10,6 +10,9 @@ from gen_data.core.scene import Instance, Scene
 from gen_data.pipeline import Pipeline
 from tests.embree import RayCaster
 
+GROUND = frozenset({"road", "junction", "ground", "parking_area"})
+"""Families on whose meshes things stand."""
+
 
 class Street:
     """A view of a street with its ground."""
@@ -18,7 +21,7 @@ class Street:
         self.scene = scene
         ground = [
             b for b in self.scene.bodies
-            if b.instance_id == 0 and b.asset.partition("?")[0] in ("road", "junction", "ground")
+            if b.instance_id == 0 and b.asset.partition("?")[0] in GROUND
         ]  # fmt: skip
         meshes = [assets.mesh(b.asset) for b in ground]
         self._caster = RayCaster(*(

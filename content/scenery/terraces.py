@@ -1,8 +1,9 @@
-"""What is paved in gardens: terraces and decks with a table and chairs, paths of slabs.
+"""What is paved in gardens: terraces and decks with a table and chairs, paths of slabs, stairs.
 
 Pieces run along Y, paths to doors along X; their origin is on the ground.
 """
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -21,6 +22,11 @@ _KINDS = ("terrace", "path", "deck", "path")
 _PATH_M, _SLAB_M = (0.5, 60.0), 0.06
 _JOINT_M = 0.06
 """Grass between the slabs of a path."""
+
+_LANDING_M, _TREAD_M, _BEHIND_M = 1.1, 0.29, 0.05
+"""A landing reaches beyond the steps that some houses have themselves."""
+_STONES = ((0.36, 0.35, 0.33), (0.27, 0.26, 0.26), (0.42, 0.38, 0.32), (0.33, 0.25, 0.21))
+"""Concrete, granite, sandstone, brick; linear RGB, assumed."""
 
 
 def terrace(rng: VariantRng) -> Solid:
@@ -81,6 +87,40 @@ def garden_path(seed: int, length_m: float) -> Solid:
         ]
     mesh = finish_mesh(join_patches(slabs), (_pavement("path", rng),), 40.0)
     return Solid(mesh, ConvexParts((np.round(hulls.box((-x, -half, 0.0), (x, half, _SLAB_M)), 6),)))
+
+
+def door_stairs(seed: int, rise_m: float, width_m: float) -> Solid:
+    """Stairs from a landing before a door down to the ground, along +X; the door is at x = 0.
+
+    The landing begins 5 cm behind the wall.
+
+    Risers are at most 18 cm high, treads 29 cm deep (DIN 18065: 14 to 21 cm, 21 to 37 cm).
+
+    Args:
+        seed: Of the stone: each of a few in turn.
+        rise_m: Height of the landing.
+        width_m: Of landing and steps.
+
+    Raises:
+        ValueError: the height is not from 0.05 to 5 m, or the width not from 0.5 to 10 m.
+    """
+    if not (0.05 <= rise_m <= 5.0 and 0.5 <= width_m <= 10.0):
+        raise ValueError(
+            f"rise_m is {rise_m:g}, width_m {width_m:g}; expected 0.05 to 5 and 0.5 to 10"
+        )
+    count, half = max(1, math.ceil(rise_m / 0.18)), 0.5 * width_m
+    tops = rise_m * np.arange(count, 0, -1) / count
+    ends = _LANDING_M + _TREAD_M * np.arange(count)
+    starts = [-_BEHIND_M, *ends[:-1]]
+    boxes = [
+        ((float(start), -half, 0.0), (float(end), half, float(top)))
+        for start, end, top in zip(starts, ends, tops, strict=True)
+    ]
+    # Without a texture, which further views of a scene would have to fetch.
+    stone = Material(_STONES[seed % len(_STONES)], 0.9)
+    mesh = finish_mesh(join_patches([block(*box) for box in boxes]), (stone,), 40.0)
+    parts = tuple(np.round(hulls.box(*box), 6) for box in boxes)
+    return Solid(mesh, ConvexParts(parts))
 
 
 def garden_path_facts(seed: int, **_: object) -> Facts:

@@ -13,7 +13,7 @@ import numpy as np
 from gen_data.core import errors, interfaces
 from gen_data.core.capture import Capture, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
-from gen_data.core.scene import LABEL_IDS_MAX, Body, Scene
+from gen_data.core.scene import LABEL_IDS_MAX, Scene
 from gen_data.core.streams import Streams
 from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline
@@ -117,7 +117,7 @@ class Pipeline:
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
         self._view: DrawnView | None = None
-        self._lifted_bodies: tuple[Body, ...] = ()
+        self._lifted: tuple[Scene, Scene] | None = None
         self._offsets_s = {s.name: s.time_offset_s for s in config.info.sensors}
         self._category_ids = {name: i for i, name in enumerate(config.info.categories, 1)}
 
@@ -312,12 +312,9 @@ class Pipeline:
                 interfaces.Stage.VIEW,
                 streams,
             )
-            scene = finish_view(scene, self.assets, self._category_ids)
-            # Renderers keep what they packed of the same tuple; views on one relief share it.
-            if scene.relief is not None and scene.bodies == self._lifted_bodies:
-                scene = replace(scene, bodies=self._lifted_bodies)
-            self._lifted_bodies = scene.bodies
-            return DrawnView(number, scene, streams)
+            finished = finish_view(scene, self.assets, self._category_ids, self._lifted)
+            self._lifted = None if scene.relief is None else (scene, finished)
+            return DrawnView(number, finished, streams)
 
         self._view = self._first_accepted(accepted.index, draw)
         return self._view

@@ -20,8 +20,28 @@ def finish_settled(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str
     return replace(finished, recovery=Outcome(other.articulations, other.tracks))
 
 
-def finish_view(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
-    """A drawn view at time 0, on its relief, with all sensors in their places."""
-    if scene.relief is not None:
-        scene = finalize_scene(lift_scene(scene, assets), assets, category_ids)
-    return place_sensors(scene)
+def finish_view(
+    scene: Scene,
+    assets: AssetLibrary,
+    category_ids: Mapping[str, int],
+    before: tuple[Scene, Scene] | None = None,
+) -> Scene:
+    """A drawn view at time 0, on its relief, with all sensors in their places.
+
+    Args:
+        scene: The view as drawn.
+        assets: Meshes of its bodies.
+        category_ids: Of all categories.
+        before: Another view as drawn, and finished. What both have is not measured again, and is
+            the same object in both, which renderers pack once.
+    """
+    if scene.relief is None:
+        return place_sensors(scene)
+    lifted = lift_scene(scene, assets)
+    if before is not None:
+        drawn, known = before
+        still = (drawn.instances, drawn.box3d, known.bodies, known.tracks)
+        if still == (scene.instances, scene.box3d, lifted.bodies, lifted.tracks):
+            lifted = replace(lifted, bodies=known.bodies, instances=known.instances)
+            return place_sensors(lifted)
+    return place_sensors(finalize_scene(lifted, assets, category_ids))

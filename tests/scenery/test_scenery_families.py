@@ -64,7 +64,7 @@ LIMITS = {
     "traffic_light": (2.6, 7.0, 1600), "drone": (0.06, 0.12, 1500), "gimbal": (0.05, 0.1, 500),
     "pedestrian_signal": (2.4, 3.3, 1500), "traffic_sign": (2.1, 3.3, 1500),
     # A path is as high as its slabs, a terrace as its parasol.
-    "terrace": (0.02, 3.1, 1200), "garden_path": (0.05, 0.08, 200),
+    "terrace": (0.02, 3.1, 1200), "garden_path": (0.05, 0.08, 200), "door_stairs": (0.5, 0.5, 200),
     **{name: (*limits.height_m, limits.triangles) for name, limits in CLUTTER.items()},
 }  # fmt: skip
 
