@@ -22,7 +22,8 @@ all steps follow one another.
 shape of an array, the unit of depths and the names of numbered predicates.
 
 Reference: Ramos et al., RLDS: an ecosystem to generate, share and use datasets in reinforcement
-learning, 2021 (names and meaning of the keys of a step). ``tfds.builder_from_directory`` reads a folder.
+learning, 2021 (names and meaning of the keys of a step). ``tfds.builder_from_directory`` reads a
+folder.
 """
 
 from collections import Counter
