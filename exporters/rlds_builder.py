@@ -1,7 +1,7 @@
 """Files from which TensorFlow Datasets reads RLDS episodes: ``tfds.builder_from_directory``.
 
 ``features.json`` is the JSON form of ``tensorflow_datasets/core/proto/feature.proto``, as
-``FeaturesDict.save_config`` writes it; ``dataset_info.json`` that of ``dataset_info.proto``.
+``FeaturesDict.save_config`` writes it; ``dataset_info.json`` is the form of ``dataset_info.proto``.
 
 Reference: Ramos et al., RLDS: an ecosystem to generate, share and use datasets in reinforcement
 learning, 2021: an episode is a ``FeaturesDict`` with a ``Dataset`` of steps.
@@ -44,7 +44,7 @@ def dataset_info(
     Args:
         data_set: Split and robot; in a name, other characters than letters and digits become ``_``.
         episodes: Number of episodes in each file, ``episodes-00000-of-00002.tfrecord`` first.
-        size_bytes: Of all files.
+        size_bytes: Size of all files together.
     """
     split, robot = data_set
     return {

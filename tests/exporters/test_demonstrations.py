@@ -259,7 +259,7 @@ numpy.savez(sys.argv[3], **arrays)
 def read_by_tfds(folder: Path, split: str) -> dict[str, Any]:
     """Arrays of all steps by key, in a process of its own: TensorFlow keeps threads."""
     found = folder.parent / "found.npz"
-    command = [sys.executable, "-c", TFDS, folder, split, found]
+    command = [sys.executable, "-c", TFDS, str(folder), split, str(found)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     with np.load(found) as arrays:
