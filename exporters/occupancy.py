@@ -57,7 +57,14 @@ from gen_data.exporters.npz import npy_bytes, npz_bytes
 from gen_data.exporters.nuscenes_recording import scene_name
 from gen_data.exporters.nuscenes_tables import Tokens
 from gen_data.exporters.sensor_selection import has_scans, laser_scanner
-from gen_data.exporters.sequences import FRAMES, frame_facts, write_bytes, write_frames, write_text
+from gen_data.exporters.sequences import (
+    FRAMES,
+    frame_facts,
+    write_bytes,
+    write_frames,
+    write_json,
+    write_text,
+)
 
 Layout = Literal["occ3d", "surroundocc", "semantickitti"]
 FREE = 17
@@ -156,7 +163,7 @@ class OccupancyGrids(base.ExporterBase):
             lines.append(canonical_json({**row, "sample_token": key}) + "\n")
         write_text(dataset_dir / FRAMES_NAME, "".join(lines))
         names = {"categories": ["", *info.categories], "surfaces": SURFACES, "states": VOXEL_STATES}
-        write_text(dataset_dir / "classes.json", canonical_json(names) + "\n")
+        write_json(dataset_dir / "classes.json", names)
         if "semantickitti" in self.layouts:
             self._link_scans(info, shard_dirs, dataset_dir / "semantickitti")
 

@@ -4,7 +4,8 @@
 
     <split>/<robot>/
         episodes-00000-of-00002.tfrecord    one record per episode
-        features.json                       type and shape of every key
+        features.json, dataset_info.json    description for TensorFlow Datasets
+        metadata.json                       type, shape and unit of every key
 
 Steps are lists of equal length under ``steps/``: ``observation/image/<camera>`` (PNG or JPEG),
 ``observation/state`` and ``action`` (all movable joints [rad or m], now and one step later),
@@ -17,12 +18,12 @@ episode ``episode_metadata/{succeeded,failure,sequence}``, of twins ``recovered`
 all steps follow one another.
 
 ``geometry`` adds PNG files of 16 bits, ``observation/{depth,instance}/<camera>``, and the arrays of
-``lerobot`` by the same names without ``annotation.``, slashes for dots; ``features.json`` has the
+``lerobot`` by the same names without ``annotation.``, slashes for dots; ``metadata.json`` has the
 shape of an array, the unit of depths and the names of numbered predicates.
 
 Reference: Ramos et al., RLDS: an ecosystem to generate, share and use datasets in reinforcement
-learning, 2021 (names and meaning of the keys of a step). Reading takes ``tf.io.parse_example``; the
-files of TensorFlow Datasets that describe a builder are not written.
+learning, 2021 (names and meaning of the keys of a step). ``tfds.builder_from_directory`` reads a
+folder.
 """
 
 from collections import Counter
@@ -35,7 +36,7 @@ from pydantic import Field
 
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.exporters import base, fragments, lerobot
+from gen_data.exporters import base, fragments, lerobot, rlds_builder
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.sequences import Frame, write_json
 from gen_data.exporters.step_geometry import OBJECTS, PREDICATES, Array, image_path, step_array
@@ -90,17 +91,19 @@ class Rlds(lerobot.LeRobot):
         """Write the episodes of all shards, and their keys."""
         totals = Counter(lerobot.data_set(episode[0].row) for episode in self._episodes(shard_dirs))
         written: Counter[tuple[str, str]] = Counter()
+        sizes: Counter[tuple[str, str]] = Counter()
         arrays = self._arrays(shard_dirs)
         for episode in self._episodes(shard_dirs):
             key = lerobot.data_set(episode[0].row)
-            folder = dataset_dir / key[0] / key[1].replace("/", "_")
+            folder = _folder(dataset_dir, key)
             folder.mkdir(parents=True, exist_ok=True)
             known = arrays.get(key, {})
             features = _features(info, episode, known)
             kinds = {_key(name): array for name, array in known.items()}
             if key not in written:
-                facts = _describe(info, features, len(episode), kinds)
-                write_json(folder / "features.json", facts)
+                facts = _describe(info, episode, features, kinds)
+                write_json(folder / "metadata.json", facts)
+                write_json(folder / "features.json", rlds_builder.features(facts))
             number = (written[key], totals[key], self.episodes_per_file)
             stem = fragments.numbered_stem("episodes", *number)
             floats = {*FLOATS, *_REWARDS, *(k for k, a in kinds.items() if a.dtype == "float32")}
@@ -109,6 +112,18 @@ class Rlds(lerobot.LeRobot):
             with (folder / f"{stem}.tfrecord").open("ab") as file:
                 file.write(record)
             written[key] += 1
+            sizes[key] += len(record)
+        for key, total in totals.items():
+            counts = [
+                min(self.episodes_per_file, total - k)
+                for k in range(0, total, self.episodes_per_file)
+            ]
+            described = rlds_builder.dataset_info(key, counts, sizes[key])
+            write_json(_folder(dataset_dir, key) / "dataset_info.json", described)
+
+
+def _folder(dataset_dir: Path, key: tuple[str, str]) -> Path:
+    return dataset_dir / key[0] / key[1].replace("/", "_")
 
 
 def _key(name: str) -> str:
@@ -162,10 +177,24 @@ def _features(
 
 
 def _describe(
-    info: DatasetInfo, features: Mapping[str, Feature], steps: int, arrays: Mapping[str, Array]
+    info: DatasetInfo,
+    episode: Sequence[Frame],
+    features: Mapping[str, Feature],
+    arrays: Mapping[str, Array],
 ) -> dict[str, Any]:
-    """Type of every key, and length of its value in a step or in the episode."""
+    """Type of every key, and length of its value in a step or in the episode.
+
+    Images and arrays have a shape; numbers and texts have none.
+    """
+    first = episode[0].row
+    lengths = {
+        key: len(values) // (len(episode) if key.startswith("steps/") else 1)
+        for key, values in features.items()
+    }
     more: dict[str, dict[str, Any]] = {key: {"shape": [*a.shape]} for key, a in arrays.items()}
+    more |= {key: {"shape": [lengths[key]]} for key in FLOATS if key in lengths}
+    for camera, sums in first["images"].items():
+        more[f"steps/observation/image/{camera}"] = {"shape": [*reversed(sums["size_px"]), 3]}
     for key, facts in more.items():
         if key.startswith("steps/observation/depth/"):
             facts["unit_m"] = info.depth_scale_m
@@ -174,12 +203,8 @@ def _describe(
     kinds = dict.fromkeys((*FLOATS, *_REWARDS), "float32") | dict.fromkeys(_INTEGERS, "int64")
     kinds |= {key: a.dtype for key, a in arrays.items() if a.dtype != "uint16"}
     return {
-        key: {
-            "dtype": kinds.get(key, "bytes"),
-            "length": len(values) // (steps if key.startswith("steps/") else 1),
-            **more.get(key, {}),
-        }
-        for key, values in features.items()
+        key: {"dtype": kinds.get(key, "bytes"), "length": length, **more.get(key, {})}
+        for key, length in lengths.items()
     }
 
 

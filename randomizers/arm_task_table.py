@@ -32,6 +32,7 @@ class Thing(base_model.Strict):
         z_m: Height of its bottom above the table, or above the bottom of ``near``.
         mass_kg: 0 = fixed; None = the asset's own.
         joint: Joint of a part that moves, in the frame of the part.
+        mistaken: Whether the arm may take it for another one; not if the hand cannot hold it.
     """
 
     assets: dict[str, str] = Field(min_length=1)
@@ -42,6 +43,7 @@ class Thing(base_model.Strict):
     z_m: float = 0.0
     mass_kg: float | None = None
     joint: "Joint | None" = None
+    mistaken: bool = True
 
 
 class Joint(base_model.Strict):
@@ -172,7 +174,8 @@ class Task(base_model.Strict):
         """Object that may be taken for the first one that is grasped; empty = none."""
         wanted = next((step.at for step in self.program if step.verb == "grasp"), "")
         for name, one in self.things.items():
-            if wanted and name != wanted and one.mass_kg != 0.0 and one.joint is None:
+            loose = one.mistaken and one.mass_kg != 0.0 and one.joint is None
+            if wanted and name != wanted and loose:
                 return name
         return ""
 

@@ -49,7 +49,7 @@ def by_lerobot_geometry(root: Path) -> Iterator[View]:
 
 def by_tfrecord_geometry(root: Path) -> Iterator[View]:
     """Geometry of the steps of an episode: lists, one after the other, and 16-bit PNG files."""
-    (path,) = root.glob("train/*/features.json")
+    (path,) = root.glob("train/*/metadata.json")
     facts = json.loads(path.read_text())
     for row in records.examples(root, "train/*/*.tfrecord"):
         for k in range(len(row["steps/is_first"])):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, partial
 from os import PathLike
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gen_data.api.config import check_whole, path_text
 from gen_data.api.dataset import (
@@ -19,9 +18,8 @@ from gen_data.api.dataset import (
 from gen_data.core import urls
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from gen_data.api.sample import SampleRecord
+    from gen_data.assemble.pipeline_factory import PipelineFactory
     from gen_data.core.interfaces import DatasetInfo
     from gen_data.core.scene import Scene
     from gen_data.runner.provenance import KeptScene
@@ -71,16 +69,16 @@ def open_dataset(
     numbers: range | SplitIndices = range(plan.n)
     if file.recipe.failed:
         numbers = SplitIndices(numbers, IsPresent(frozenset(file.recipe.failed)))
-    samples = SampleSequence(RecipeSamples(GeneratedSamples(factory), cache), numbers)
+    samples = SampleSequence(RecipeSamples(factory, cache), numbers)
     return samples.split(split) if split else samples
 
 
-@dataclass
-class RecipeSamples:
+class RecipeSamples(GeneratedSamples):
     """Samples of a recipe, from the cache or rendered."""
 
-    generated: GeneratedSamples
-    cache: SampleCache
+    def __init__(self, make_pipeline: PipelineFactory, cache: SampleCache) -> None:
+        super().__init__(make_pipeline)
+        self.cache = cache
 
     def sample(self, index: int) -> SampleRecord:
         """Return the sample of that number, as it would be read from the finished data set."""
@@ -101,7 +99,7 @@ class RecipeSamples:
         from gen_data.core.temporary_folders import temporary_folder
         from gen_data.runner.shard import write_images, write_records
 
-        with self.generated.pipeline() as pipeline, temporary_folder("sample") as folder:
+        with self.pipeline() as pipeline, temporary_folder("sample") as folder:
             sample = pipeline.sample(index)
             write_images(pipeline.info, sample, folder)
             write_records(sample, None, folder)
@@ -110,21 +108,7 @@ class RecipeSamples:
     @cached_property
     def info(self) -> DatasetInfo:
         """Facts about the data set."""
-        return self.generated.make_pipeline.info
-
-    @property
-    def categories(self) -> tuple[str, ...]:
-        """Sorted names of all categories that a sample may contain."""
-        return self.generated.categories
-
-    @property
-    def config(self) -> Mapping[str, Any]:
-        """The resolved configuration."""
-        return self.generated.config
-
-    def close(self) -> None:
-        """Stop the engines."""
-        self.generated.close()
+        return self.make_pipeline.info
 
 
 def _parse_scene(files: Files, index: int) -> KeptScene:

@@ -28,7 +28,8 @@ class FamilyParameter:
     def words(self) -> str:
         """Its possible values: ``1.2 to 1.8``, ``false, true``."""
         if self.is_range:
-            return " to ".join(f"{end:.4g}" for end in self.options)
+            ends = (str(end) if isinstance(end, int) else f"{end:.4g}" for end in self.options)
+            return " to ".join(ends)
         return ", ".join(map(format_parameter, self.options))
 
 

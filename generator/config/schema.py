@@ -97,23 +97,26 @@ def documented_attributes(model: type[BaseModel]) -> dict[str, str]:
     found: dict[str, str] = {}
     for base in reversed(model.__mro__):
         if issubclass(base, BaseModel) and base is not BaseModel:
-            found |= dict(_attribute_docstrings(base))
+            found |= _attribute_docstrings(base)
             found |= dict(_attributes_section(inspect.cleandoc(base.__doc__ or "")))
     return found
 
 
-def _attribute_docstrings(model: type) -> Iterator[tuple[str, str]]:
+@cache
+def _attribute_docstrings(model: type) -> dict[str, str]:
     """Fields with a docstring below them; none for a class without source, as in a notebook."""
     try:
         (tree,) = ast.parse(textwrap.dedent(inspect.getsource(model))).body
     except (OSError, SyntaxError):
-        return
+        return {}
     body = tree.body if isinstance(tree, ast.ClassDef) else []
+    found: dict[str, str] = {}
     for field, after in pairwise(body):
         if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
             match after:
                 case ast.Expr(value=ast.Constant(value=str(text))):
-                    yield field.target.id, " ".join(text.split())
+                    found[field.target.id] = " ".join(text.split())
+    return found
 
 
 def _attributes_section(docstring: str) -> Iterator[tuple[str, str]]:

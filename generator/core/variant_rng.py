@@ -8,7 +8,7 @@ A draw with a name is a parameter of the family: an asset id may ask for its val
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -28,7 +28,8 @@ class Draw:
 
     Attributes:
         options: Possible values; ``(low, high)`` of a range, both included.
-        is_range: Whether all numbers between the two options are possible too.
+        is_range: Whether all numbers between the two options are possible too, or all whole ones
+            between two whole ones.
         value: The value drawn or asked for.
     """
 
@@ -52,6 +53,9 @@ class Drawing:
     drawn: dict[str, Draw] = field(default_factory=dict)
     root: str = ""
 
+
+_LISTED_MAX = 1000
+"""Whole numbers of a draw that are listed; of more, the first and the last are stated."""
 
 _DRAWING: ContextVar[Drawing | None] = ContextVar("_DRAWING", default=None)
 
@@ -88,7 +92,9 @@ class VariantRng(Rng):
         """Draw a whole number: the part before the point of a number from [low, high)."""
         value = int(low + (high - low) * float(self.random()))
         options = range(int(low), max(int(low), math.ceil(high) - 1) + 1)
-        return int(self._settle(name, options, value))
+        is_long = len(options) > _LISTED_MAX
+        known = (options[0], options[-1]) if is_long else options
+        return int(self._settle(name, known, value, is_range=is_long))
 
     def choose(self, options: Sequence[T], name: str = "") -> T:
         """Draw one of the options, all equally likely."""
@@ -119,7 +125,9 @@ class VariantRng(Rng):
         """
         if not name or self.drawing is None:
             return drawn
-        find = _find_in_range if is_range else _find_option
+        find: Callable[..., Any] = _find_option
+        if is_range:
+            find = _find_whole if isinstance(drawn, int) else _find_in_range
         asked = self.drawing.asked
         value: Any = find(name, asked[name], options) if name in asked else drawn
         known = tuple(dict.fromkeys(map(_in_ids, options)))
@@ -141,6 +149,13 @@ def _find_in_range(name: str, asked: DrawnValue, ends: Sequence[float]) -> float
     if isinstance(asked, (float, int)) and low - slack <= asked <= high + slack:
         return float(asked)
     raise ValueError(f"{name} expects a number from {low:.6g} to {high:.6g}")
+
+
+def _find_whole(name: str, asked: DrawnValue, ends: Sequence[int]) -> int:
+    low, high = ends
+    if isinstance(asked, (float, int)) and low <= asked <= high and asked == int(asked):
+        return int(asked)
+    raise ValueError(f"{name} expects a whole number from {low} to {high}")
 
 
 def _find_option(name: str, asked: DrawnValue, options: Sequence[T]) -> T:

@@ -78,6 +78,21 @@ def test_impossible_values_are_refused(name: str, asked: DrawnValue, message: st
         draw_desk(0)
 
 
+@pytest.mark.parametrize("asked", [0, 17, 999_999, 17.0])
+def test_many_whole_numbers_are_recorded_by_their_ends(asked: DrawnValue) -> None:
+    with drawing({"number": asked}) as drawn:
+        found = variant_rng("code", 1).whole(0, 1_000_000, "number")
+    assert (found, type(found)) == (asked, int)
+    assert drawn["number"] == Draw((0, 999_999), True, asked)
+
+
+@pytest.mark.parametrize("asked", [-1, 1_000_000, 0.5, "many"])
+def test_others_than_many_whole_numbers_are_refused(asked: DrawnValue) -> None:
+    message = "^number expects a whole number from 0 to 999999$"
+    with drawing({"number": asked}), pytest.raises(ValueError, match=message):
+        variant_rng("code", 1).whole(0, 1_000_000, "number")
+
+
 def test_the_first_stream_decides_which_streams_belong_to_the_asset() -> None:
     """A bowl's contents keep their own height, as do later assets."""
     with drawing({"height_m": 0.2}) as drawn:

@@ -2,6 +2,8 @@
 
 import io
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,7 @@ from gen_data.exporters.rlds import Rlds
 from gen_data.exporters.step_geometry import Part
 from tests.exporters.drives import drive_info
 from tests.randomizers.doubles import two_link_arm
+from tests.tiers import slow
 
 INSTRUCTION = "Put the crate on the mat."
 EPISODE = Episode(
@@ -88,7 +91,7 @@ def read_episode(folder: Path) -> Any:
 
 def assert_written(folder: Path, samples: Any) -> None:
     """Lists of four steps; vectors of the steps follow one another; a failure has no reward."""
-    example, described = read_episode(folder), json.loads((folder / "features.json").read_text())
+    example, described = read_episode(folder), json.loads((folder / "metadata.json").read_text())
     assert set(example.features.feature) == set(described)
     for key, fact in described.items():
         count = 4 if key.startswith("steps/") else 1
@@ -215,10 +218,10 @@ def test_geometry_of_every_step_is_in_lerobot_as_arrays(
 def test_geometry_of_every_step_is_in_rlds_as_lists_and_images(
     world: Any, related: Any, tmp_path: Path
 ) -> None:
-    """Arrays of the steps follow one another in the shape of ``features.json``."""
+    """Arrays of the steps follow one another in the shape of ``metadata.json``."""
     exporter = Rlds(geometry=PARTS)
     folder = world.export(exporter, drive_info(world), related, tmp_path) / "train/toys_arm"
-    example, facts = read_episode(folder), json.loads((folder / "features.json").read_text())
+    example, facts = read_episode(folder), json.loads((folder / "metadata.json").read_text())
     assert_written(folder, related)
 
     contacts = np.reshape(values(example, "steps/contact"), (4, *facts["steps/contact"]["shape"]))
@@ -230,6 +233,82 @@ def test_geometry_of_every_step_is_in_rlds_as_lists_and_images(
     channels = related[1].capture.readings[camera].channels
     (ids,) = (a for c, a in channels.items() if c.value == "instance")
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(file))), ids)
+
+
+TFDS = """
+import sys
+import numpy, tensorflow_datasets
+builder = tensorflow_datasets.builder_from_directory(sys.argv[1])
+arrays = {}
+def keep(name, value):
+    for key, part in value.items() if isinstance(value, dict) else ():
+        keep(f"{name}/{key}", part)
+    if not isinstance(value, dict):
+        arrays.setdefault(name, []).append(value)
+for episode in tensorflow_datasets.as_numpy(builder.as_dataset(split=sys.argv[2])):
+    keep("episode_metadata", episode["episode_metadata"])
+    for step in episode["steps"]:
+        keep("steps", step)
+arrays["episodes"] = builder.info.splits[sys.argv[2]].num_examples
+arrays["unit_m"] = builder.info.metadata["steps/observation/depth/left"]["unit_m"]
+arrays["predicates"] = builder.info.metadata["steps/relation"]["predicates"]
+numpy.savez(sys.argv[3], **arrays)
+"""
+
+
+def read_by_tfds(folder: Path, split: str) -> dict[str, Any]:
+    """Arrays of all steps by key, in a process of its own: TensorFlow keeps threads."""
+    found = folder.parent / "found.npz"
+    command = [sys.executable, "-c", TFDS, str(folder), split, str(found)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    with np.load(found) as arrays:
+        return dict(arrays)
+
+
+@slow
+def test_tensorflow_datasets_reads_geometry_of_every_step(
+    world: Any, related: Any, tmp_path: Path
+) -> None:
+    """Images, depth, masks, poses, contacts, scene graph and cameras, of the files in a folder."""
+    pytest.importorskip("tensorflow_datasets")
+    given = [replace(sample, split="val") for sample in related]
+    exporter = Rlds(geometry=PARTS, episodes_per_file=1)
+    folder = world.export(exporter, drive_info(world), given, tmp_path) / "val/toys_arm"
+    read = read_by_tfds(folder, "val")
+
+    assert (read["episodes"], len(read["steps/is_first"])) == (2, len(given))
+    assert read["steps/is_first"].dtype == bool
+    assert read["episode_metadata/failure"].tolist() == [b"slip", b"slip"]
+    assert read["steps/language_instruction"].tolist() == [INSTRUCTION.encode()] * len(given)
+    order = read["episode_metadata/sequence"]
+    expected = [given[4 * sequence + k] for sequence in order for k in range(4)]
+    names = [i.instance_id for i in expected[0].scene.instances if i.annotated]
+    for k, sample in enumerate(expected):
+        assert read["steps/object_id"][k].tolist() == names
+        poses = [(*i.T_world_instance.translation_m, *i.T_world_instance.quaternion_wxyz)
+                 for i in sample.scene.instances if i.annotated]  # fmt: skip
+        assert np.allclose(read["steps/object_pose"][k], poses, atol=1e-6)
+        (arm,) = sample.scene.articulations
+        positions = arm.joint_track.positions(sample.scene.time_s)
+        assert np.allclose(read["steps/observation/state"][k], positions, atol=1e-6)
+        for camera, truth in sample.truth.items():
+            channels = {c.value: a for c, a in sample.capture.readings[camera].channels.items()}
+            image = read[f"steps/observation/image/{camera}"][k]
+            assert np.array_equal(image, channels["rgb"])
+            ids = read[f"steps/observation/instance/{camera}"][k, ..., 0]
+            assert np.array_equal(ids, channels["instance"])
+            depth_m = read[f"steps/observation/depth/{camera}"][k, ..., 0] * read["unit_m"]
+            shown = np.isfinite(channels["depth"]) & (channels["depth"] < 65535.5 * read["unit_m"])
+            assert np.abs(depth_m - channels["depth"])[shown].max() < 0.51 * read["unit_m"]
+            assert np.allclose(read[f"steps/K/{camera}"][k], truth.camera.intrinsics.matrix())
+            pose = truth.camera.T_world_camera.matrix()
+            assert np.allclose(read[f"steps/T_world_camera/{camera}"][k], pose, atol=1e-6)
+    contacts = read["steps/contact"][2]
+    assert np.allclose(contacts, [[2.5, 0.1, 0.2, 0.3], [9.81, 0.0, 0.5, 0.75]], atol=1e-6)
+    first = [(a, read["predicates"][p], b) for a, p, b in
+             read["steps/relation"][list(order).index(0) * 4]]  # fmt: skip
+    assert first == [(1, "on", 2), (1, "near", 3)]
 
 
 def test_a_task_of_two_arms_has_the_joints_and_hands_of_both(

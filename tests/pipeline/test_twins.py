@@ -89,10 +89,14 @@ def test_one_twin_fails_as_named_and_the_other_recovers(task: str, cause: str) -
         assert ("notice" in labels) == episode.succeeded
 
 
-@slow
-def test_first_frames_are_the_same_bytes_and_later_ones_are_not() -> None:
-    """All channels of both cameras, and poses; sequences 0 and 1 of ten instants, 1 s apart."""
-    with twins("stack", "miss", "steps_per_scene=10", "step_s=1") as pipeline:
+@pytest.mark.parametrize(
+    "task",
+    [pytest.param(task, marks=slow if task == "stack" else exhaustive) for task in sorted(tasks())],
+)
+def test_first_frames_are_the_same_bytes_and_later_ones_are_not(task: str) -> None:
+    """All channels of both cameras, and poses; sequences 0 and 1 of ten instants, 2 s apart."""
+    cause = "miss" if "miss" in tasks()[task].twin_causes else "late"
+    with twins(task, cause, "steps_per_scene=10", "step_s=2") as pipeline:
         assert pipeline.info.views_per_scene == 2
         first, other = pipeline.sample(0), pipeline.sample(10)
         last, other_last = pipeline.sample(9), pipeline.sample(19)
