@@ -21,8 +21,8 @@ from gen_data.randomizers.base import (
 class Textures(SurfaceRandomizer):
     """Covers each target with a drawn texture; printed materials are unchanged.
 
-    With ``prints`` it is the other way round: pictures, of your own for example, replace those on
-    mugs, cups, boxes and labels, and follow the object's texture coordinates.
+    With ``prints`` it is the other way round: pictures, such as yours, replace the prints of mugs,
+    cups, boxes and labels, and follow the object's texture coordinates.
 
     Attributes:
         textures: Families or tags of textures, such as wood, marble, fabric.

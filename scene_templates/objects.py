@@ -188,7 +188,7 @@ class Objects(element.Element):
 
 
 def _words(asset: Asset) -> set[str]:
-    """What excludes an asset."""
+    """Words that exclude an asset."""
     return {asset.category, f"{asset.category}/{asset.subcategory}", *asset.tags}
 
 
