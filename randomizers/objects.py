@@ -44,6 +44,7 @@ class Objects(GroupRandomizer):
         chosen = [assets.get(draw_asset(weights, rng)) for _ in range(count)]
         scales = [round(self.scale.draw(rng), 4) for _ in range(count)]
         upright = [self.upright.draw(rng) for _ in range(count)]
+        hangs = group.placement == "hang"
         outlined = group.placement == "row"
         items = [
             Item(
@@ -59,8 +60,8 @@ class Objects(GroupRandomizer):
                 asset.asset_id,
                 pose.rounded(),
                 scale,
-                motion="dynamic",
-                mass_kg=round(asset.mass_kg * scale**3, 6),
+                motion="static" if hangs else "dynamic",
+                mass_kg=0.0 if hangs else round(asset.mass_kg * scale**3, 6),
             )
             for asset, scale, pose in zip(chosen, scales, poses, strict=True)
         ]

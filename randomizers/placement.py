@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from gen_data.assets.asset_ids import parse_asset_id
+from gen_data.assets.families import declared
 from gen_data.config import distributions as dist
 from gen_data.core.errors import LayoutRejected, Rejection
 from gen_data.core.interfaces import AssetIndex
@@ -27,6 +29,8 @@ BESIDE_M = (0.0005, 0.006)
 _LIFT_M = 0.0005
 _OPEN_M, _FRONT = 1.0, 0.15
 """Below a board at less than this height, rows stand in this front share of the free depth."""
+_LEAN_RAD = 0.45
+"""Largest angle between the axis of a hanging object and the vertical (assumed)."""
 _TIDY = 0.6
 """Share of rows in which all objects face the same way (assumed)."""
 _TOO_HIGH = Rejection("object higher than the space above the surface", "smaller objects or scale")
@@ -76,6 +80,8 @@ class Floor:
     surface: SupportSurface
     taken: list[tuple[float, float, float, float]] = field(default_factory=list)
     closed: list[Vec3] = field(default_factory=list)
+    hooks: tuple[Vec3, ...] = ()
+    """Points from which objects hang, in its frame [m]."""
     spot: Vec3 | None = None
     """Disc ``(x, y, radius)`` [m] with the centres of a pile; None = the whole surface."""
 
@@ -115,6 +121,8 @@ def find_floors(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Fl
         surface = scene.surface(name)
         T_surface_world = surface.T_world_surface.inverse()
         floor = Floor(surface)
+        if group.placement == "hang":
+            floor.hooks = _hooks_m(scene.body(surface.body).asset)
         for x, y, radius_m in group.keep_out:
             here = _transform(T_surface_world, (x, y, surface.T_world_surface.translation_m[2]))
             floor.closed.append((here[0], here[1], radius_m))
@@ -125,6 +133,14 @@ def find_floors(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Fl
                     floor.take(*cylinder)
         floors.append(floor)
     return floors
+
+
+def _hooks_m(asset: str) -> tuple[Vec3, ...]:
+    hooks_of = declared(asset, "hooks_m", None)
+    if hooks_of is None:
+        return ()
+    hooks: tuple[Vec3, ...] = hooks_of(**parse_asset_id(asset).parameters)
+    return hooks
 
 
 def lay_out(
@@ -166,6 +182,8 @@ def _place_all(
         return _scatter(group, items, floors, rng)
     if group.placement == "row":
         return _line_up(group, items, floors, rng)
+    if group.placement == "hang":
+        return _hang(group, items, floors, rng)
     if group.placement == "pile" and items:
         floors = [_choose_spot(group, items, floors, rng, upright)]
     return [
@@ -338,6 +356,26 @@ def _rows_at_a_place(items: Sequence[Item], floor: Floor, rng: Rng, tidy: bool) 
         _stand(item, floor, (to_x + at[0], to_y + at[1], 0.0), SE3.about_z(yaw))
         for item, yaw, at in places
     ]
+
+
+def _hang(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+    """Poses below drawn hooks, turned in any way about the vertical and a little from it."""
+    hooks = [(floor, hook) for floor in floors for hook in floor.hooks]
+    if len(hooks) < len(items):
+        raise _no_place(group)
+    chosen = np.argsort(rng.uniform(size=len(hooks)), kind="stable")
+    poses = []
+    for item, number in zip(items, chosen, strict=False):
+        floor, hook = hooks[int(number)]
+        lean = _LEAN_RAD * float(rng.uniform(-1.0, 1.0))
+        turn = SE3.about_z(2.0 * math.pi * float(rng.uniform())) @ _about_x(lean)
+        down = turn @ SE3((0.0, 0.0, -item.half_m[2]))
+        poses.append(floor.surface.T_world_surface @ SE3(hook) @ down)
+    return poses
+
+
+def _about_x(angle_rad: float) -> SE3:
+    return SE3(quaternion_wxyz=(math.cos(0.5 * angle_rad), math.sin(0.5 * angle_rad), 0.0, 0.0))
 
 
 def _stack(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:

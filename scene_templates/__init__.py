@@ -14,6 +14,7 @@ TABLE = PluginTable[Element](
         "drone": "gen_data.scene_templates.drone:Drone",
         "ego": "gen_data.scene_templates.ego:Ego",
         "fields": "gen_data.scene_templates.fields:Fields",
+        "fruit_bough": "gen_data.scene_templates.fruit_bough:FruitBough",
         "ground": "gen_data.scene_templates.ground:GroundElement",
         "horizon": "gen_data.scene_templates.horizon:Horizon",
         "junction": "gen_data.scene_templates.junction:Junction",

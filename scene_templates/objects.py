@@ -19,6 +19,7 @@ from gen_data.scene_templates import element
 
 LAYERS: dict[Placement, int] = {
     "drop": 4, "scatter": 1, "grid": 1, "stack": 4, "row": 1, "pile": 4,
+    "hang": 1,
 }  # fmt: skip
 """Largest number of objects that start above one another, by placement."""
 MARGIN_M = 0.02
@@ -36,7 +37,7 @@ class AssetChoice(Strict):
         tags: Assets with all of these tags.
         any_of: Assets with at least one of these tags.
         ids: Assets by id; the name of a family stands for all of its variants.
-        exclude: Tags or categories to leave out.
+        exclude: Tags, categories or subcategories, such as ``apple/half``, to leave out.
         prefer: Tags in order of preference: each category keeps only its assets with the first of
             these tags that it has.
     """
@@ -66,11 +67,7 @@ class AssetChoice(Strict):
         for asset_id in self.ids:
             members = assets.variants(asset_id) or (assets.get(asset_id),)
             found |= {a.asset_id: a for a in members}
-        fitting = [
-            asset
-            for asset in found.values()
-            if not {asset.category, *asset.tags} & set(self.exclude)
-        ]
+        fitting = [asset for asset in found.values() if not _words(asset) & set(self.exclude)]
         kept = sorted(asset.asset_id for asset in self._select_preferred(fitting))
         if not kept:
             raise errors.ConfigError(f"{field}: no asset matches; expected other tags or ids")
@@ -99,7 +96,8 @@ class Objects(element.Element):
         assets: Assets to choose from.
         placement: drop: objects fall from above; scatter: they stand apart; grid: they stand in
             cells; stack: they stand in towers; row: they stand side by side and touch, one row
-            behind another; pile: they fall on one spot, next to and on top of one another.
+            behind another; pile: they fall on one spot, next to and on top of one another; hang:
+            they hang in the leaves of a ``fruit_bough``, on their stalks.
         annotate: Whether to write labels for them.
     """
 
@@ -187,6 +185,11 @@ class Objects(element.Element):
                 "expected fewer objects or a larger surface"
             )
         return points
+
+
+def _words(asset: Asset) -> set[str]:
+    """Words that exclude an asset."""
+    return {asset.category, f"{asset.category}/{asset.subcategory}", *asset.tags}
 
 
 def empty_group(name: str, placement: Placement) -> ObjectGroup:

@@ -5,7 +5,7 @@ Kinds of bottles are rows of ``bottles.yaml``.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +51,7 @@ class BottleStyle:
         closures: ``screw``, ``crown``, ``pump``, ``trigger``, ``nozzle`` or ``spout``.
         labels: ``wrap`` all around, ``front``, or ``none``.
         ribs: Number of grooves around the body.
+        crush: Depth of dents in the wall, as a share of the radius.
     """
 
     height_m: Point2
@@ -70,6 +71,7 @@ class BottleStyle:
     closures: tuple[str, ...] = ("screw",)
     labels: tuple[str, ...] = ("wrap",)
     ribs: int = 0
+    crush: Point2 = (0.0, 0.0)
 
 
 class BottleChoice(NamedTuple):
@@ -118,23 +120,70 @@ def bottle(seed: int) -> Solid:
     upper = [*shoulder, (style.neck_m, neck_z), (style.neck_m, neck_top)]
     wall = _Wall(radius, (z0, z1), upper, [0.06] * (len(upper) - 1))
     closure, cap_parts = _CLOSURES[choice.closure](cap_radius, cap_z, height)
+    dented = style.crush[1] > 0.0
     patches = [
-        *_make_wall(wall, choice.label, style.ribs),
+        *_make_wall(wall, choice.label, style.ribs, fine=dented),
         lathe([(style.neck_m, neck_top), (0.0, neck_top)], _SEGMENTS, 0),
         closure.painted(2),
     ]
     foot = [(0.93 * radius, 0.0), (radius, 0.008), (radius, z1)]
     mouth = (max(style.neck_m, 0.96 * cap_radius), neck_z + 0.004)
+    side = subdivide([(radius, 0.008), (radius, z1)], 0.022)[1:-1] if dented else []
+    foot[2:2] = side
     stages = [*foot, *shoulder, mouth, (cap_radius, cap_z), (0.97 * cap_radius, height)]
     flat = np.array([1.0, style.depth, 1.0])
     parts = [hull * flat for hull in (*hulls.stack(_drop_level_stages(stages)), *cap_parts)]
     materials = _bottle_materials(style, choice, seed, rng)
     if choice.drink:
         level = 0.01 + rng.between(*style.fill) * (neck_z - 0.01)
-        patches.append(_contents(wall, level))
+        patches.append(_contents(wall, level, fine=dented))
         materials.append(vessel_contents.liquid(vessel_contents.DRINKS[choice.drink], rng))
+    if dented:
+        dents = _draw_dents((0.012, neck_z - 0.01), rng.between(*style.crush), rng)
+        patches = [replace(patch, corners_m=dents.press(patch.corners_m)) for patch in patches]
+        parts = [dents.press(part) for part in parts]
     flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
     return make_centred_solid(flattened, materials, parts)
+
+
+class _Dents(NamedTuple):
+    """Dents in a wall about Z.
+
+    Attributes:
+        places: Of each dent, angle about Z [rad] and height [m].
+        depths: Shares of the radius by which the wall gives way.
+        widths: Half widths, an angle [rad] and a height [m].
+        between_m: Lowest and highest points that give way.
+    """
+
+    places: Array
+    depths: Array
+    widths: Array
+    between_m: Point2
+
+    def press(self, points_m: Array) -> Array:
+        """The points, shape [..., 3], moved towards the axis."""
+        x, y, z = (points_m[..., i, None] for i in range(3))
+        turn = np.arctan2(y, x) - self.places[:, 0]
+        turn = np.mod(turn + math.pi, 2.0 * math.pi) - math.pi
+        away = (turn / self.widths[:, 0]) ** 2 + ((z - self.places[:, 1]) / self.widths[:, 1]) ** 2
+        low, high = self.between_m
+        free = np.clip(np.minimum(z - low, high - z) / 0.02, 0.0, 1.0)[..., 0]
+        share = 1.0 - free * np.minimum((self.depths * np.exp(-away)).sum(axis=-1), 0.4)
+        return np.asarray(points_m * np.stack([share, share, np.ones_like(share)], axis=-1))
+
+
+def _draw_dents(between_m: Point2, depth: float, rng: VariantRng) -> _Dents:
+    """Four broad dents, where fingers pressed, and eight small ones (assumed)."""
+    low, high = between_m
+    places, depths, widths = [], [], []
+    for k in range(12):
+        broad = k < 4
+        places.append((rng.between(-math.pi, math.pi), rng.between(low + 0.02, high)))
+        depths.append(depth * rng.between(0.6, 1.0) * (1.0 if broad else 0.45))
+        widths.append((rng.between(0.5, 0.9), rng.between(0.02, 0.04)) if broad
+                      else (rng.between(0.2, 0.4), rng.between(0.007, 0.015)))  # fmt: skip
+    return _Dents(np.array(places), np.array(depths), np.array(widths), between_m)
 
 
 def _bottle_materials(
@@ -167,7 +216,7 @@ def jar(seed: int) -> Solid:
     style = rng.choose(("wrap", "front"), "style")
     wall = _Wall(radius, (0.2 * height, (neck - 0.14) * height), upper, [0.02, 0.006])
     patches = [
-        *_make_wall(wall, style, 0),
+        *_make_wall(wall, style),
         lathe([(mouth, top + 0.004), (0.0, top + 0.004)], _SEGMENTS, 0),
         _lid(lid_radius, top, height),
     ]
@@ -227,14 +276,17 @@ class _Wall(NamedTuple):
         return fillet(rest, [0.0, 0.0, *self.radii, 0.0], 3)
 
 
-def _make_wall(wall: _Wall, label: str, ribs: int) -> list[Patch]:
-    """Bottom and wall in slot 0, the label in slot 1."""
+def _make_wall(wall: _Wall, label: str, ribs: int = 0, *, fine: bool = False) -> list[Patch]:
+    """Bottom and wall in slot 0, the label in slot 1; fine walls have points for dents."""
     z0, z1 = wall.label
     proud = _PROUD_M if label == "wrap" else 0.0
     lower, upper = wall.below(proud), wall.above(proud)
+    band = [(wall.radius + proud, z0), (wall.radius + proud, z1)]
     if ribs:
         lower, upper = (_groove(line, wall.radius, ribs) for line in (lower, upper))
-    band = [(wall.radius + proud, z0), (wall.radius + proud, z1)]
+        band = _groove(band, wall.radius, ribs) if label == "none" else band
+    if fine:
+        lower, band, upper = (_fine(line) for line in (lower, band, upper))
     patches = [
         lathe(lower, _SEGMENTS, 0),
         lathe(band, _SEGMENTS, 1 if label == "wrap" else 0, v=(0.0, 1.0)),
@@ -245,10 +297,15 @@ def _make_wall(wall: _Wall, label: str, ribs: int) -> list[Patch]:
     return patches
 
 
+def _fine(line: list[Point2]) -> list[Point2]:
+    """The profile with points for dents, and the very ends that its neighbours have."""
+    return [line[0], *subdivide(line, 0.007)[1:-1], line[-1]]
+
+
 def _groove(line: list[Point2], radius: float, ribs: int) -> list[Point2]:
     """The profile with round grooves where it runs along the body."""
     pitch = 0.12 / ribs
-    fine = subdivide(line, 0.2 * pitch)
+    fine = [line[0], *subdivide(line, 0.2 * pitch)[1:-1], line[-1]]
     return [
         (r - 0.0012 * (0.5 - 0.5 * math.cos(2 * math.pi * z / pitch)), z)
         if abs(r - radius) < 1e-6 and z > 0.012
@@ -269,7 +326,7 @@ def _front_label(radius: float, low: float, high: float) -> Patch:
     return join_patches([sheet, ends[0], ends[1].flipped()])
 
 
-def _contents(wall: _Wall, level: float) -> Patch:
+def _contents(wall: _Wall, level: float, *, fine: bool = False) -> Patch:
     """What is in a bottle, up to a level; slot 3."""
     profile = [(r, z) for r, z in wall.profile() if r > 0.5 * wall.radius or z > 0.02]
     low = 0.006
@@ -278,7 +335,7 @@ def _contents(wall: _Wall, level: float) -> Patch:
     inner = [(r - _WALL_M, z) for r, z in side]
     edge = inner[-1][0]
     top = [(0.9 * edge, level - 0.0006), (0.0, level - 0.0006)]
-    return lathe([(0.0, low), *inner, *top], _SEGMENTS, 3)
+    return lathe([(0.0, low), *(subdivide(inner, 0.007) if fine else inner), *top], _SEGMENTS, 3)
 
 
 Closure = tuple[Patch, list[Array]]

@@ -51,7 +51,7 @@ class FruitStyle:
         lumps: Depth of irregular swellings.
         skin: Texture: a family of its own, or a kind of ``fruit_skin``.
         skin_first: Seed of the texture of the first variant.
-        stalk: ``twig``, ``button``, ``calyx``, ``stump`` or empty.
+        stalk: ``twig``, ``button``, ``calyx``, ``stump``, ``crown`` or empty.
         leaf: Probability of a leaf.
         cut: Kind of ``fruit_cut`` of a halved fruit; empty = whole.
         lying: Whether it rests on its side, along X.
@@ -216,11 +216,24 @@ def _stump(top: float, radius: float, rng: VariantRng) -> Stalk:
     return stalk, Material(draw_linear(_GREENS, 0.1, rng), 0.6, printed=True)
 
 
+def _crown(top: float, radius: float, rng: VariantRng) -> Stalk:
+    """Six pointed sepals around a hollow, as on pomegranates."""
+    size = radius * rng.between(0.3, 0.42)
+    blades = []
+    for i in range(6):
+        blade = _blade(size, 0.55, 0.14, 0.0).rotated("y", -rng.between(1.05, 1.4))
+        blade = blade.moved(x=0.4 * size, z=top - 0.1 * size)
+        blades.append(blade.rotated("z", math.pi * i / 3 + rng.between(-0.1, 0.1)))
+    return join_patches(blades), Material(draw_linear(("#b0522f", "#a83a2a"), 0.1, rng), 0.6,
+                                          printed=True)  # fmt: skip
+
+
 _STALKS: Mapping[str, Callable[[float, float, VariantRng], Stalk]] = {
     "twig": _twig,
     "button": _button,
     "calyx": _calyx,
     "stump": _stump,
+    "crown": _crown,
 }
 
 

@@ -319,7 +319,7 @@ def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:
               (0.0, z - lip, 0.03), (0.0, z - 0.002, 0.03), (0.002, z, 0.028),
               (rim + w - 0.002, z, 0.014), (rim + w, z - 0.002, 0.012),
               (rim + w, w + 0.008, 0.012), (rim + w + 0.008, w, 0.006)]  # fmt: skip
-    loops = [_rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
+    loops = [rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
     rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in loops])
     return join_patches([shapes.grid(rows), shapes.fan(loops[0][::-1]), shapes.fan(loops[-1])])
 
@@ -341,7 +341,8 @@ def _bin_ribs(x: float, y: float, z: float, rim: float) -> list[Box]:
     return made
 
 
-def _rounded_loop(half_x: float, half_y: float, radius: float, z: float) -> Array:
+def rounded_loop(half_x: float, half_y: float, radius: float, z: float) -> Array:
+    """A level rectangle with rounded corners, counter-clockwise, [20, 3]; lengths in metres."""
     points = []
     for quarter, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
         x, y = sx * (half_x - radius), sy * (half_y - radius)

@@ -118,7 +118,7 @@ def vessel(group: str, seed: int) -> Solid:
     others = [make for is_wanted, make in _PARTS if is_wanted(choice)]
     left = _PARTS_MAX - len(grip) - len(filling.parts) - len(others)
     parts = [*vessels.hollow_hulls(walls, filling.solid_to_m, 4 if stem else 2, left), *grip]
-    if group == "vase":
+    if group in ("vase", "carafe"):
         # Nothing falls into a narrow neck.
         parts = vessels.solid_hulls(walls)
     for make in others:
@@ -202,6 +202,7 @@ _FINISHES: Mapping[str, Callable[[VariantRng], Material]] = {
     "party": lambda rng: plastic_material(rng, ("#c3121f", "#c3121f", "#1f4fa0", "#202124")),
     "paper": lambda rng: painted_material(rng.choose(("#f0eee8", "#f0eee8", "#b98e5f")), 0.55),
     "wood": _wood,
+    "terracotta": lambda rng: painted_material(rng.choose(("#b5643f", "#c4754c", "#a85a3a")), 0.85),
 }
 
 

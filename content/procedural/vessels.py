@@ -19,7 +19,15 @@ from gen_data.core.variant_rng import VariantRng, variant_rng
 
 Point2 = shapes.Point2
 SEGMENTS = 48
-_PLAIN_FINISHES = ("glass", "clear_plastic", "steel", "painted_steel", "plastic", "party")
+_PLAIN_FINISHES = (
+    "glass",
+    "clear_plastic",
+    "steel",
+    "painted_steel",
+    "plastic",
+    "party",
+    "terracotta",
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from gen_data.core.shutter import INSTANT, Shutter
 
 SharedValue = str | float | int | bool
 Motion = Literal["static", "dynamic", "kinematic"]
-Placement = Literal["drop", "scatter", "grid", "stack", "row", "pile", "along"]
+Placement = Literal["drop", "scatter", "grid", "stack", "row", "pile", "hang", "along"]
 PanelKind = Literal["rectangle", "disk"]
 LampKind = Literal["sphere", "spot", PanelKind]
 LightKind = Literal["sphere", "spot", "sun", PanelKind]
@@ -138,7 +138,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class SupportSurface:
-    """A horizontal rectangle that objects can stand on.
+    """A rectangle that objects can stand on, level or sloping gently.
 
     Attributes:
         body: Name of the body it belongs to.

@@ -262,7 +262,8 @@ def _holds(surface: SupportSurface, low_m: Array, high_m: Array, slack_m: float)
     """Whether the centre of bounds is within the rectangle and their bottom not below it."""
     center = 0.5 * (low_m + high_m)
     x, y, _ = surface.T_world_surface.inverse().apply(center)
-    height = float(low_m[2]) - surface.T_world_surface.translation_m[2]
+    under = np.array([center[0], center[1], low_m[2]])
+    height = float(surface.T_world_surface.inverse().apply(under)[2])
     return (
         abs(float(x)) <= 0.5 * surface.size_m[0] + slack_m
         and abs(float(y)) <= 0.5 * surface.size_m[1] + slack_m

@@ -35,6 +35,9 @@ LONGEST_SIDE_M = {
     "pizza": (0.1, 0.34), "cake": (0.055, 0.26), "donut": (0.08, 0.11), "hot_dog": (0.13, 0.21),
     "hand": (0.47, 0.65), "marker": (0.02, 1.0), "calibration_board": (0.06, 1.7),
     "qr_code": (0.025, 0.42),
+    "pomegranate": (0.065, 0.12), "onion": (0.05, 0.1), "persimmon": (0.05, 0.09),
+    "courgette": (0.11, 0.3), "jug": (0.08, 0.26), "carafe": (0.18, 0.28),
+    "canister": (0.08, 0.19), "plant_pot": (0.07, 0.15),
     "washer": (0.014, 0.04), "wine_glass": (0.13, 0.245), "wrench": (0.1, 0.26),
 }  # fmt: skip
 

@@ -271,3 +271,22 @@ def test_weights_and_friction_change_for_what_falls_only() -> None:
             assert body.mass_kg == pytest.approx(0.6)
             assert 0.3 <= body.friction <= 0.4
             assert body.restitution == 0.2
+
+
+def test_prints_replaces_printed_images_of_named_categories_only() -> None:
+    """The label of a bottle; what is not printed, and other categories, stay as they are."""
+    scene = scene_with("brick", "bottle")
+    category = FakeAssets().get("bottle").category
+    own = FakeAssets().materials("bottle")
+
+    def prints(*categories: str) -> Scene:
+        given = {"name": "p", "textures": ("wood",), "prints": True, "categories": categories}
+        return after(Textures(**given, probability=ALWAYS), scene)
+
+    assert changed(scene, prints("mug")) == set()
+    made = prints(category).body("clutter/1").materials
+    assert changed(scene, prints(category)) == {"clutter/1"}
+    for before, now in zip(own, made, strict=True):
+        assert (before != now) == bool(before.printed and before.texture)
+        if before != now:
+            assert now.texture_scale_m == 0.0

@@ -15,6 +15,7 @@ from gen_data.config.data_files import load_table
 from gen_data.content.procedural import bottles, material_presets, packaging
 from gen_data.content.procedural.textures import artwork as art
 from gen_data.content.procedural.textures.artwork import Box, Color, Place
+from gen_data.content.procedural.textures.pictures import MANNERS, picture
 from gen_data.core.asset_types import TextureData
 from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
@@ -182,7 +183,7 @@ def _design(seed: int, rng: VariantRng, sizes: Sequence[str] = _WORDS["weights"]
         note=rng.choose(_WORDS["notes"]),
         size=rng.choose(sizes),
         layout=int(rng.between(0, 5)),
-        picture=int(rng.between(0, 5)),
+        picture=int(rng.between(0, 8)),
         bold=int(rng.between(1, 5)),
     )
 
@@ -265,8 +266,12 @@ def _ground(image: Image, design: _Design, rng: VariantRng) -> None:
 def _picture(image: Image, box: Box, design: _Design, rng: VariantRng) -> None:
     x0, y0, x1, y1 = art.pixels(image, box)
     radius = min(x1 - x0, y1 - y0) // 2
-    draw = (_bowl, _fruits, _leaves, _landscape, _rings)[design.picture]
-    draw(art.pen(image), ((x0 + x1) // 2, (y0 + y1) // 2), radius, design, rng)
+    if design.picture >= len(_DRAWN):
+        manner = MANNERS[design.picture - len(_DRAWN)]
+        image.paste(picture(x1 - x0, y1 - y0, design.ground, rng, manner), (x0, y0))
+        return
+    centre = (x0 + x1) // 2, (y0 + y1) // 2
+    _DRAWN[design.picture](art.pen(image), centre, radius, design, rng)
 
 
 def _bowl(pen: ImageDraw, at: Place, r: float, design: _Design, rng: VariantRng) -> None:
@@ -313,6 +318,9 @@ def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: VariantRng) 
         s = r * i / 5
         fill = design.accent if i % 2 else design.second
         pen.ellipse([cx - s, cy - s, cx + s, cy + s], fill=fill)
+
+
+_DRAWN = (_bowl, _fruits, _leaves, _landscape, _rings)
 
 
 def _info(w: int, h: int, design: _Design, rng: VariantRng) -> Image:

@@ -17,6 +17,7 @@ from gen_data.config.data_files import load_table
 from gen_data.content.procedural.material_presets import PALETTES, hex_to_srgb8
 from gen_data.content.procedural.textures import artwork as art
 from gen_data.content.procedural.textures.artwork import Color
+from gen_data.content.procedural.textures.pictures import Manner, picture
 from gen_data.content.procedural.textures.texture_images import color, mix_colors, quantize
 from gen_data.core.asset_types import Float32, TextureData
 from gen_data.core.noise import smoothstep
@@ -32,7 +33,8 @@ _WHITE: Color = (244, 241, 234)
 _CLAY: Color = (176, 138, 104)
 # Probability that the ground is white (assumed); the others have one of _GROUNDS, else a glaze.
 _WHITE_SHARES = {"bands": 0.5, "rim": 0.8, "dots": 0.4, "motif": 0.75, "logo": 0.6, "words": 0.7,
-                 "willow": 1.0, "brand": 0.6}  # fmt: skip
+                 "willow": 1.0, "brand": 0.6, "photograph": 0.7, "cartoon": 0.6,
+                 "lines": 0.8}  # fmt: skip
 _GROUNDS = {"speckled": (*_WORDS["creams"], *_WORDS["creams"], "#2d4f7c", "#3d6b5c"),
             "brand": (*_WORDS["creams"], *_WORDS["inks"]),
             "wrap": (*_WORDS["creams"], *_WORDS["inks"])}  # fmt: skip
@@ -284,10 +286,34 @@ def _wrap(rng: VariantRng, ground: Color) -> Image:
     return image
 
 
+def _pictures(manner: Manner) -> Callable[[VariantRng, Color], Image]:
+    """A maker of a picture on both sides of the handle, or of one all around."""
+
+    def make(rng: VariantRng, ground: Color) -> Image:
+        image = art.canvas(_WIDTH_PX, _HEIGHT_PX, ground)
+        if rng.chance(0.25):
+            image.paste(picture(_WIDTH_PX, _HEIGHT_PX - 24, ground, rng, manner), (0, 12))
+            return image
+        side = rng.choose((150, 190, 220))
+        panel = picture(rng.choose((side, int(1.25 * side))), side, ground, rng, manner)
+        words = rng.chance(0.4)
+        line, ink = " ".join(rng.choose(_WORDS["sayings"]).split("|")), _ink(rng, ground)
+        for middle in (0.25, 0.75):
+            left = int(middle * _WIDTH_PX) - panel.width // 2
+            image.paste(panel, (left, (_HEIGHT_PX - side) // 2 - (14 if words else 0)))
+            if words:
+                box = (middle - 0.16, 0.88, middle + 0.16, 0.98)
+                art.text(image, box, line, ink, 1)
+        return image
+
+    return make
+
+
 _DECORS: Mapping[str, Callable[[VariantRng, Color], Image]] = {
     "bands": _bands, "rim": _rim, "speckled": _speckled, "dots": _dots, "motif": _motif,
     "logo": _logo, "words": _words, "dip": _dip, "drips": _drips, "willow": _willow,
-    "brand": _brand, "wrap": _wrap,
+    "brand": _brand, "wrap": _wrap, "photograph": _pictures("photograph"),
+    "cartoon": _pictures("cartoon"), "lines": _pictures("lines"),
 }  # fmt: skip
 
 _FROTH = {"coffee": ("#1d0e06", "#6a4222"), "crema": ("#7a4a1e", "#b98042"),

@@ -82,6 +82,8 @@ class ImagePipeline(base_model.Strict):
             keys are those of the photograph; each pixel of the image is the mean of
             ``reduction`` squared of them, after each has its own tone.
         focus: Depth of field; null = everything is sharp.
+        shake_px: Length of the path that the image moves along while the shutter is open, as in a
+            hand; straight, in a drawn direction.
         flare: Share of the light far beyond white that returns as ghosts.
         glare: Share of all light that the lens scatters around its source; 0.02 suits a clean
             lens, 0.1 a dirty one.
@@ -130,6 +132,7 @@ class ImagePipeline(base_model.Strict):
     preset: str = "ideal"
     reduction: float = Field(1.0, ge=1, le=64)
     focus: Focus | None = None
+    shake_px: Annotated[Scalar, Bounds(0, 60)] = NONE
     flare: UnitInterval = NONE
     glare: UnitInterval = NONE
     blur_px: Annotated[Scalar, Bounds(0, 20)] = NONE
@@ -361,6 +364,14 @@ def _defocus(light: Light, shot: Shot) -> Light:
     return replace(light, values=optics.defocus(light.values, radius_px))
 
 
+def _shake(light: Light, shot: Shot) -> Light:
+    length_px = _draw(shot.pipeline, "shake_px", shot.rng) / shot.pipeline.reduction
+    if length_px <= 0.0:
+        return light
+    turn = math.pi * float(shot.rng.uniform())
+    return replace(light, values=optics.smear(light.values, length_px, turn))
+
+
 def _flare(light: Light, shot: Shot) -> Light:
     share = _draw(shot.pipeline, "flare", shot.rng)
     if share <= 0.0:
@@ -474,6 +485,7 @@ def _effect(field: str, neutral: float, apply: Callable[[Float32, float], Float3
 STAGES: tuple[Stage, ...] = (
     _lens_drops,
     _defocus,
+    _shake,
     _flare,
     _effect("glare", 0.0, add_glare),
     _effect("blur_px", 0.0, optics.apply_blur),

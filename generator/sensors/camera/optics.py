@@ -157,6 +157,26 @@ def _disc(radius_px: float) -> Float32:
     return np.asarray(disc / disc.sum(), np.float32)
 
 
+def smear(image: Float32, length_px: float, angle_rad: float) -> Float32:
+    """Average an image over a straight path, as of a camera that turns during the exposure.
+
+    Light beyond white keeps its energy, so that bright edges grow as they do in photographs.
+    """
+    count = max(2, math.ceil(2.0 * length_px))
+    way = (np.arange(count) + 0.5) / count - 0.5
+    step_x, step_y = length_px * math.cos(angle_rad), length_px * math.sin(angle_rad)
+    reach = math.ceil(0.5 * length_px) + 1
+    kernel = np.zeros((2 * reach + 1, 2 * reach + 1), np.float32)
+    for x, y in zip(reach + step_x * way, reach + step_y * way, strict=True):
+        i, j = int(y), int(x)
+        kernel[i, j] += (1.0 - y + i) * (1.0 - x + j)
+        kernel[i, j + 1] += (1.0 - y + i) * (x - j)
+        kernel[i + 1, j] += (y - i) * (1.0 - x + j)
+        kernel[i + 1, j + 1] += (y - i) * (x - j)
+    kernel /= kernel.sum()
+    return np.asarray(cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_REPLICATE), np.float32)
+
+
 _GHOSTS = (
     (-0.35, 0.02, (0.5, 1.0, 0.6)),
     (-0.8, 0.05, (1.0, 0.5, 0.5)),
