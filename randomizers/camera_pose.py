@@ -167,20 +167,21 @@ class CameraPose(RandomizerBase):
         raise self.reject("no free place for a camera", remedy)
 
     def _frame_thing(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
-        """Draw the share once: places that are taken change object and direction, never the share.
+        """Draw the share once: places that are taken change object and direction, not the share.
 
-        Otherwise large shares of small objects, near others, would be rarer than declared.
+        Otherwise large shares of small objects, near others, would be rarer than declared. Only
+        where all places are taken, as in a compartment, the smallest declared share is tried.
         """
         assert self.fills is not None, "only framed cameras come here"
-        share = self.fills.draw(rng)
         seen = False
-        for _ in range(TRIES):
-            thing = self._draw_thing(scene, assets, rng)
-            framing = self._draw_framing(share, camera, rng)
-            pose = frame(thing, framing, camera.intrinsics, self.nearest_m)
-            seen = seen or pose is not None
-            if pose is not None and self._is_free(camera, pose, scene, assets):
-                return replace(camera, T_world_camera=pose.rounded())
+        for share in (self.fills.draw(rng), self.fills.support()[0]):
+            for _ in range(TRIES):
+                thing = self._draw_thing(scene, assets, rng)
+                framing = self._draw_framing(share, camera, rng)
+                pose = frame(thing, framing, camera.intrinsics, self.nearest_m)
+                seen = seen or pose is not None
+                if pose is not None and self._is_free(camera, pose, scene, assets):
+                    return replace(camera, T_world_camera=pose.rounded())
         if not seen:
             remedy = "a smaller range of fills or off_center, or another lens"
             raise self.reject("the lens cannot show an object at the drawn share", remedy)

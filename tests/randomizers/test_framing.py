@@ -265,6 +265,20 @@ def test_aims_can_be_mixed_and_need_no_share() -> None:
     assert min(counts.values()) > 8
 
 
+def test_small_shares_are_tried_only_where_the_drawn_one_has_no_place() -> None:
+    """A share of .9 or .2: with 0.4 m around the things, the camera has a place at .2 only."""
+    either = Choice({0.9: 1.0, 0.2: 1e-9})
+    sides = {}
+    for clearance_m in (0.0, 0.4):
+        camera = framed(fills=either, off_center=Constant(0.0), clearance_m=clearance_m)
+        T = camera.T_world_camera.inverse()
+        corners = [LENSES["pinhole"].project(T.apply(corners_m(b))) for b in SCENE.bodies[1:]]
+        ahead = [c for c in corners if np.isfinite(c).all()]
+        sides[clearance_m] = [float(np.ptp(c, axis=0).max()) / 640 for c in ahead]
+    assert min(abs(side - 0.9) for side in sides[0.0]) < 0.02
+    assert min(abs(side - 0.2) for side in sides[0.4]) < 0.02
+
+
 WIDE = replace(SCENE.cameras[0], intrinsics=LENSES["panorama"])
 
 
