@@ -235,6 +235,20 @@ def by_pandas_tables(root: Path) -> Iterator[View]:
             yield View(truth.image_name(int(index), path.parent.name), tuple(things))
 
 
+def by_numpy_voxels(root: Path) -> Iterator[View]:
+    """States, objects and observed voxels of the grid around the ego."""
+    import pandas
+
+    for row in pandas.read_json(root / "frames.jsonl", lines=True).itertuples():
+        grid = np.load(root / f"grids/{row.index:09d}.npz")
+        masks = {f"state {k}": grid["state"] == k for k in range(3)}
+        ids = grid["instance_id"]
+        masks |= {f"instance {k}": ids == k for k in np.unique(ids)}
+        masks |= {f"observed by {n}": grid[f"observed_{n}"] for n in row.sensors}
+        things = tuple(thing(name, row.low_m, mask) for name, mask in masks.items())
+        yield View(truth.image_name(row.index, "world"), things)
+
+
 def by_pandas_birdseye(root: Path) -> Iterator[View]:
     """Boxes in the frame of the ego, moved to the world, and layers of the map."""
     import pandas

@@ -193,6 +193,19 @@ def birdseye(folder: Path) -> Iterator[View]:
         yield View(view.name, (*view.things, *layers))
 
 
+def voxels(folder: Path) -> Iterator[View]:
+    """States, and voxels of each instance and of each sensor, in the grid around the ego."""
+    for sample in gen_data.open(folder):
+        assert sample.core.frame is not None
+        grid = sample.core.frame.occupancy
+        assert grid is not None
+        masks = {f"state {k}": grid.state == k for k in range(3)}
+        masks |= {f"instance {k}": grid.instance_id == k for k in np.unique(grid.instance_id)}
+        masks |= {f"observed by {name}": mask for name, mask in grid.observed.items()}
+        things = (thing(name, grid.low_m, mask) for name, mask in masks.items())
+        yield View(image_name(sample.index, "world"), tuple(things))
+
+
 def grasps(folder: Path) -> Iterator[View]:
     """Score, width between open fingers, rotation and place of the grasps of each object seen."""
     for sample in gen_data.open(folder):

@@ -108,7 +108,9 @@ def round_fruit(group: str, seed: int) -> Solid:
         parts = [hulls.extreme(patches[0].corners_m)]
     else:
         patches = [shapes.ball(shape, 26, 36)]
-        parts = [hulls.extreme(patches[0].corners_m)]
+        # Of a long fruit, most even directions would end at its tips.
+        stretch = np.array([1.0, 1.0, max(1.0, 0.5 * style.slim[0])])
+        parts = [hulls.extreme(patches[0].corners_m / stretch) * stretch]
     radius = style.radius_m[0]
     if style.stalk:
         stalk, material = _STALKS[style.stalk](top, radius, rng)

@@ -24,7 +24,8 @@ def test_rows_have_the_type_of_the_table_in_the_order_of_the_file() -> None:
     # Seeds take the styles in turn; an estate is a sedan with other measures.
     assert " ".join(BOTTLES) == (
         "wine beer water soda ketchup detergent burgundy champagne white_wine longneck stubby "
-        "ribbed family juice milk oil spirit sauce shampoo soap spray flask sport medicine squeeze"
+        "ribbed family juice milk oil spirit sauce shampoo soap spray flask sport medicine squeeze "
+        "tinted waisted crushed"
     )
     sedan, estate = DESIGNS["sedan"], DESIGNS["estate"]
     assert (sedan.rails, estate.rails) == (False, True)

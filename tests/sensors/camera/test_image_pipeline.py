@@ -46,8 +46,8 @@ def speckled(height: int = 48, width: int = 64) -> Any:
 def test_the_chain_has_the_order_of_a_camera() -> None:
     """Glass first, from its front to its barrel, then the sensor, then colours."""
     assert [stage.__name__.strip("_") for stage in STAGES] == [
-        "lens_drops", "defocus", "flare", "glare", "blur", "chromatic_aberration", "vignetting",
-        "image_circle", "image_sensor", "denoise", "saturation",
+        "lens_drops", "defocus", "shake", "flare", "glare", "blur", "chromatic_aberration",
+        "vignetting", "image_circle", "image_sensor", "denoise", "saturation",
     ]  # fmt: skip
 
 
