@@ -1,4 +1,8 @@
-"""One server of the live page and one browser for all of its tests: both take seconds to start."""
+"""One server of the live page and one browser for the tests of a file: both take seconds to start.
+
+They end with the file: a browser that stays open keeps an event loop, which other tests of the
+process may not have.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     """``gen-data edit mine.yaml --real real`` with four pictures."""
     pytest.importorskip("nicegui")

@@ -9,6 +9,7 @@ from gen_data import annotations
 from gen_data.exporters import TABLE
 from gen_data.exporters.label_map import LabelMap, MappedExporter
 from tests.exporters.drives import drive_info
+from tests.exporters.test_occupancy import gridded
 from tests.tiers import sampled
 
 PACKED = {"huggingface", "rlds", "tfrecord", "webdataset", "rerun"}
@@ -17,7 +18,9 @@ EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
 """Formats with regions that a score leaves out class by class; see ``test_ignored_objects``."""
 NO_CLASS = {"cityscapes", "hdf5", "kitti", "kitti_tracking", "language", "motchallenge"}
 """Formats with a mark for ignored objects that needs no class, or that only mention them."""
-OWN_IMAGES = {"hdf5", "lerobot", "mcap", "pointclouds", "semantickitti", "tables", "usd"} | PACKED
+OWN_IMAGES = PACKED | {
+    "hdf5", "lerobot", "mcap", "occupancy", "pointclouds", "semantickitti", "tables", "usd"
+}  # fmt: skip
 """Formats without image files of the shards."""
 TRACKS = {"kitti_raw", "nuscenes"}
 """Formats of tracks, from which an ignored object disappears and a missing one does not."""
@@ -29,11 +32,13 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def given(exporter: Any, world: Any) -> tuple[Any, Any]:
-    """The seven frames; a drive with two cameras or an arm, or bodies, for formats of these."""
+    """The seven frames; a drive with cameras, an arm or voxels, or bodies, for their formats."""
     if exporter.type == "kitti_stereo":
         return world.pairs()
     if exporter.type in ("lerobot", "rlds"):
         return drive_info(world), world.reach()
+    if exporter.type == "occupancy":
+        return drive_info(world), gridded(world)
     if exporter.type == "bop":
         return world.info(7), world.with_bodies(world.samples)
     return world.info(7, lidars=("top",)), world.samples
