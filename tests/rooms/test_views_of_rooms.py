@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -157,8 +157,8 @@ def test_cameras_stand_on_free_floor_at_the_drawn_height() -> None:
         assert not near
 
 
-def walk(**fields: object) -> Scene:
-    return RoomPath(name="p", **fields)(flat(), library(), Streams(5, 4).rng("p"))
+def walk(number: int = 4, **fields: object) -> Scene:
+    return RoomPath(name="p", **fields)(flat(), library(), Streams(5, number).rng("p"))
 
 
 @pytest.mark.slow
@@ -182,10 +182,10 @@ def test_a_walk_has_its_speed_and_touches_nothing() -> None:
 
 @pytest.mark.slow
 def test_a_walk_looks_where_it_goes() -> None:
-    """Its X axis is within 60 degrees of its velocity, nearly always."""
-    scene = walk(speed_m_s=dist.Constant(0.6), duration_s=6.0)
+    """Its X axis is within 60 degrees of its velocity, nearly always: at turns it looks around."""
+    scenes = [walk(number, speed_m_s=dist.Constant(0.6), duration_s=6.0) for number in range(6)]
     ahead = []
-    for k in range(1, 59):
+    for scene, k in product(scenes, range(1, 59, 3)):
         moved = scene_at(scene, 0.1 * k)
         pose, later = (
             s.body("carrier").T_world_body for s in (moved, scene_at(scene, 0.1 * k + 0.05))
