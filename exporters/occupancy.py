@@ -125,9 +125,11 @@ class OccupancyGrids(base.ExporterBase):
         """Contents of the files of a sample by their ending."""
         velocities = grid.velocities_m_s(sample.scene.instances)
         files = {"npz": npz_bytes(_arrays(sample, grid, velocities), LEVEL)}
+        if {"occ3d", "surroundocc"} & set(self.layouts):
+            classes = driving_classes(sample.scene, grid)
         if "occ3d" in self.layouts:
             labels = {
-                "semantics": driving_classes(sample.scene, grid),
+                "semantics": classes,
                 "mask_lidar": _seen_by(grid, info.lidars),
                 "mask_camera": _seen_by(grid, info.cameras),
                 "flow": velocities[..., :2].astype("<f2"),
@@ -135,8 +137,8 @@ class OccupancyGrids(base.ExporterBase):
             files["occ3d"] = npz_bytes(labels, LEVEL)
         if "surroundocc" in self.layouts:
             surface = grid.state == VOXEL_STATES.index("surface")
-            voxels, classes = np.argwhere(surface), driving_classes(sample.scene, grid)[surface]
-            files["surroundocc"] = npy_bytes(np.column_stack([voxels, classes]).astype("<i8"))
+            rows = np.column_stack([np.argwhere(surface), classes[surface]])
+            files["surroundocc"] = npy_bytes(rows.astype("<i8"))
         lidar = laser_scanner(info, self.lidar, self.type)
         if "semantickitti" in self.layouts and has_scans(shard_dir, lidar, sample.index):
             points = point_cloud_io.read_points(shard_dir, lidar, sample.index)

@@ -70,9 +70,8 @@ def _voxels_of_large(
 ) -> tuple[NDArray[np.intp], NDArray[np.int16], NDArray[np.intp], bool]:
     """Voxels of its surface in the box, their slots, voxels inside it, whether it is a sheet."""
     side_m = TILE_SAMPLES * pitch_m
-    corners = np.stack([box.low_m, box.high_m])[np.indices((2, 2, 2)).reshape(3, -1).T, range(3)]
-    ends = T_frame_body.inverse().apply(corners) / (body.scale * side_m)
-    first, last = (np.floor(ends.min(axis=0)), np.floor(ends.max(axis=0)))
+    ends = T_frame_body.inverse().apply(box.corners_m) / (body.scale * side_m)
+    first, last = np.floor(ends.min(axis=0)), np.floor(ends.max(axis=0))
     (x, y), (u, v) = first[:2].astype(int), last[:2].astype(int)
     tiles = [
         _sample_tile(body.asset, pitch_m, (i, j), assets)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.se3 import SE3, Array, Vec3
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,11 @@ class VoxelBox:
         """Highest corner in the frame."""
         x, y, z = (low + n * self.voxel_m for low, n in zip(self.low_m, self.shape, strict=True))
         return x, y, z
+
+    @property
+    def corners_m(self) -> Array:
+        """The eight corners in the frame, [8, 3]."""
+        return np.stack([self.low_m, self.high_m])[np.indices((2, 2, 2)).reshape(3, -1).T, range(3)]
 
     def may_contain(self, T_frame_body: SE3, low_m: Vec3, high_m: Vec3, scale: float) -> bool:
         """Whether the bounds of a scaled body in a frame overlap the box."""

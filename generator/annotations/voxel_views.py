@@ -54,8 +54,7 @@ def seen_by_camera(box: VoxelBox, scene: Scene, reading: SensorReading) -> Mask:
 
 
 def _farthest_m(box: VoxelBox, T_world_camera: SE3) -> float:
-    corners = np.stack([box.low_m, box.high_m])[np.indices((2, 2, 2)).reshape(3, -1).T, range(3)]
-    away = box.T_world_frame.apply(corners) - T_world_camera.translation_m
+    away = box.T_world_frame.apply(box.corners_m) - T_world_camera.translation_m
     return float(np.sqrt((away * away).sum(axis=1)).max())
 
 
