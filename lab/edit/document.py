@@ -62,19 +62,21 @@ class Analysis:
     warnings: tuple[str, ...] = ()
 
 
-def analyse(text: str, file: str) -> Analysis:
+def analyse(text: str, file: str, *, first_scene_only: bool = False) -> Analysis:
     """Load a text as the command line would load the file; every error is a fault.
 
     Args:
         text: Text of the editor, saved or not.
         file: Path of the file, from which relative paths start.
+        first_scene_only: Leave out outcomes of shared values other than the first scene's: a street
+            has more than sixty, which take ten times as long.
     """
     from gen_data.assemble.config import parse_config
 
     try:
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always")
-            config = parse_config(text, file, Path(file).stem)
+            config = parse_config(text, file, Path(file).stem, first_scene_only=first_scene_only)
     except GenDataError as error:
         return Analysis(None, tuple(find_faults(str(error), file)))
     return Analysis(config, (), tuple(str(one.message) for one in heard))

@@ -22,7 +22,7 @@ from gen_data.core.errors import GenDataError
 from gen_data.lab.edit import completion
 from gen_data.lab.edit.browse_page import BrowsePage
 from gen_data.lab.edit.data_sets import is_data_set
-from gen_data.lab.edit.document import find_item
+from gen_data.lab.edit.document import Fault, find_item
 from gen_data.lab.edit.files import read_file
 from gen_data.lab.edit.own_files_panel import OwnFilesPanel
 from gen_data.lab.edit.panels import (
@@ -32,7 +32,7 @@ from gen_data.lab.edit.panels import (
     home_link,
     show_full,
 )
-from gen_data.lab.edit.samples import Shown
+from gen_data.lab.edit.samples import Check, Shown
 from gen_data.lab.edit.session import EACH, SLOTS, Session, Variation
 from gen_data.lab.edit.start_page import StartPage
 from gen_data.lab.edit.workers import Refused, Ticket
@@ -274,6 +274,9 @@ class EditorTab:
         """Order all pictures of the current text."""
         orders = self.session.orders()
         self.desk.order(self.key, orders, self._receive)
+        # A text with faults has nothing else to check.
+        checks = [Check(orders[0].text, orders[0].file)] if orders else []
+        self.desk.order(f"{self.key}/check", checks, self._receive_check)
         self._orders = orders or self._orders
         self._show_tiles()
 
@@ -285,6 +288,13 @@ class EditorTab:
             self._show_faults()
         if not self.session.outdated and len(self.session.results) == len(self._orders):
             self._refresh_panel()
+
+    def _receive_check(self, ticket: Ticket, result: tuple[Fault, ...] | Refused) -> None:
+        assert isinstance(ticket.job, Check)
+        if not isinstance(result, Refused) and result:
+            self.session.accept_check(ticket.job, result)
+            self._order()
+            self._show_faults()
 
     def _caption(self, slot: int) -> str:
         varied = self.session.grid.variation

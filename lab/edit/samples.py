@@ -28,6 +28,7 @@ from gen_data.core.bounded_cache import CountCache
 from gen_data.core.capture import Channel
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.temporary_folders import temporary_folder
+from gen_data.lab.edit.document import Fault, analyse
 from gen_data.lab.edit.overlays import KINDS, LAYERS, View, draw_view, first_kind
 from gen_data.packs.provision import open_assets
 from gen_data.report.drawn_parameters import Draw, observe_randomizer, shared_draws
@@ -84,6 +85,19 @@ class Recording:
     def run(self, studio: Studio) -> bytes:
         """Content of a ``.rrd`` file."""
         return studio.record(self.order)
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """Order of the faults of a text in all outcomes of its shared values."""
+
+    text: str
+    file: str
+
+    def run(self, studio: Studio) -> tuple[Fault, ...]:
+        """Faults, each with its place; empty = none."""
+        del studio
+        return analyse(self.text, self.file).faults
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,16 +194,23 @@ class Studio:
             raise errors.ConfigError(f"a recording {missing}")
         from gen_data.preview.rerun_recording import save_recording
 
-        opened = self._open(order)
+        opened = self._open(order, first_scene_only=False)
         with temporary_folder("edit") as folder:
             path = folder / "sample.rrd"
             sample = opened.sample(order.index)
             save_recording(path, [sample], opened.library, info=opened.info)
             return path.read_bytes()
 
-    def _open(self, order: Order) -> OpenedText:
-        name, changes = Path(order.file).stem, order.overrides
-        config = parse_config(order.text, order.file, name, overrides=changes)
+    def _open(self, order: Order, *, first_scene_only: bool = True) -> OpenedText:
+        """Open a text, by default with the first outcome of its shared values checked.
+
+        Categories that only other scenes have are then without number: scans show them in the
+        colour of what has no label.
+        """
+        name, once = Path(order.file).stem, first_scene_only
+        config = parse_config(
+            order.text, order.file, name, overrides=order.overrides, first_scene_only=once
+        )
         folders = config.asset_folders
         opened = repr([(folder, _index_time_ns(folder)) for folder in folders])
         library = self._libraries.get(opened, lambda: open_assets(folders))

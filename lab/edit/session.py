@@ -13,7 +13,7 @@ from gen_data.lab.edit import text_edits
 from gen_data.lab.edit.document import Analysis, Fault, analyse, find_faults
 from gen_data.lab.edit.files import Folders, OpenedFile
 from gen_data.lab.edit.overlays import View
-from gen_data.lab.edit.samples import Order, Shown
+from gen_data.lab.edit.samples import Check, Order, Shown
 from gen_data.lab.edit.workers import Refused
 
 if TYPE_CHECKING:
@@ -100,15 +100,23 @@ class Session:
         return self.text != self.file.text
 
     def set_text(self, text: str) -> None:
-        """Take a text and find its faults; the latest valid configuration stays."""
+        """Take a text and find the faults of its first scene; the latest valid configuration stays.
+
+        Pictures can be ordered then; the job ``Check`` finds the other faults.
+        """
         self.text = text
         try:
             self.folders.refuse_outside(text, self.name)
         except GenDataError as error:
             self.analysis = Analysis(None, tuple(find_faults(str(error), self.name)))
             return
-        self.analysis = analyse(text, self.name)
+        self.analysis = analyse(text, self.name, first_scene_only=True)
         self.config = self.analysis.config or self.config
+
+    def accept_check(self, check: Check, faults: tuple[Fault, ...]) -> None:
+        """Take the faults of all scenes of a text, unless there is a newer one."""
+        if faults and check.text == self.text:
+            self.analysis = Analysis(None, faults)
 
     def orders(self) -> list[Order]:
         """Orders of all pictures; none for a text with faults, whose pictures are outdated then."""

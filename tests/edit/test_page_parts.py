@@ -20,7 +20,7 @@ from gen_data.core.lens import Lens
 from gen_data.lab.edit import data_sets, own_files, server
 from gen_data.lab.edit.desk import Pictures
 from gen_data.lab.edit.files import Folders, OpenedFile
-from gen_data.lab.edit.samples import Labelled, Shown, shrink
+from gen_data.lab.edit.samples import Check, Labelled, Shown, Studio, shrink
 from gen_data.lab.edit.server import COOKIE, Guard, free_port, usual_port
 from gen_data.lab.edit.session import Session, vary
 from gen_data.lab.edit.statistics import rows, summarise
@@ -174,6 +174,24 @@ def test_pictures_stay_until_newer_ones_come(tmp_path: Path) -> None:
     assert session.results == {0: SHOWN}
     assert session.config is not None
     assert [fault.line for fault in session.faults] == [2]
+
+
+def test_a_fault_of_another_scene_is_found_after_the_pictures_are_ordered(tmp_path: Path) -> None:
+    """The first scene draws a valid value; the check of all others names the one that is not."""
+    text = (
+        "extends: tabletop.yaml\n"
+        "shared: {turn_deg: {choice: [400, 20]}}\n"
+        "sensors: {color: {yaw_deg: $shared.turn_deg}}\n"
+    )
+    session = make_session(tmp_path, text)
+    check = Check(text, session.name)
+    assert session.orders()
+    assert session.faults == ()
+    session.accept_check(replace(check, text="seed: 1\n"), check.run(Studio()))
+    assert session.faults == ()
+    session.accept_check(check, check.run(Studio()))
+    assert [fault.line for fault in session.faults] == [3]
+    assert session.orders() == []
 
 
 def test_faults_of_scenes_are_faults_of_the_text(tmp_path: Path) -> None:
