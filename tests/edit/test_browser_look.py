@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.edit.live_page import EDITOR, Live
+from tests.edit.live_page import EDITOR, Live, put_cursor
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -52,6 +52,12 @@ PLACES = """() => {
 }"""
 
 
+CONTROLS = frozenset(
+    {"button", "checkbox", "combobox", "slider", "spinbutton", "switch", "tab", "textbox"}
+)
+"""Roles of WAI-ARIA that take input."""
+
+
 def test_the_page_fits_a_phone_and_a_desk(page: Page) -> None:
     """It does not scroll sideways, and no word is cut off."""
     for width in (400, 1280):
@@ -68,6 +74,20 @@ def test_the_page_fits_a_phone_and_a_desk(page: Page) -> None:
                 )
                 == []
             )
+
+
+def test_every_control_has_a_name_for_screen_readers(page: Page) -> None:
+    """In Chromium's accessibility tree, with the sliders of a field at the cursor."""
+    put_cursor(page, "count: ")
+    page.wait_for_selector("[role=slider]")
+    tree = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
+    named: dict[str, list[str]] = {}
+    for node in tree:
+        role = node.get("role", {}).get("value")
+        if role in CONTROLS and not node.get("ignored"):
+            named.setdefault(role, []).append(node.get("name", {}).get("value", ""))
+    assert set(named) >= {"button", "checkbox", "combobox", "slider", "spinbutton", "tab"}
+    assert [role for role, names in named.items() if not all(names)] == []
 
 
 def test_every_text_has_the_contrast_of_wcag_aa(page: Page) -> None:
