@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from gen_data.lab.edit.overlays import View
+from gen_data.lab.edit.samples import Order, Studio
 from tests.edit.live_page import (
     COUNTS,
     DRAWN,
@@ -113,6 +118,35 @@ def test_controls_and_layers_change_the_pictures(page: Page) -> None:
         assert (pictures(page) == drawn) == (
             page.locator("[data-layer=masks][aria-checked=true]").count() == 0
         )
+
+
+def test_each_view_has_the_pictures_that_the_library_draws(live: Live, page: Page) -> None:
+    """Depth, normals, and keypoints and 3D boxes on the photograph, in the order of the tiles."""
+    studio, start = Studio(), View()
+    order = Order(text_of(page), str(live.folder / "mine.yaml"), 0, start)
+
+    def expect(view: View, act: Callable[[], None]) -> None:
+        before = page.evaluate(COUNTS)
+        act()
+        wait_for_pictures(page, before)
+        page.wait_for_function(DRAWN)
+        shown = [studio.show(replace(order, index=k, view=view)).jpeg for k in range(4)]
+        assert pictures(page) == shown
+
+    def choose(name: str) -> None:
+        page.click("label:has-text('picture') >> nth=0")
+        page.click(f".q-item:has-text('{name}')")
+
+    expect(replace(start, kind="depth"), lambda: choose("depth"))
+    expect(replace(start, kind="normals"), lambda: choose("normals"))
+    expect(start, lambda: choose("photograph"))
+    layers: frozenset[str] = start.layers
+    for layer in ("keypoints", "boxes3d"):
+        layers ^= {layer}
+        expect(replace(start, layers=layers), partial(page.click, f"[data-layer={layer}]"))
+    for layer in ("keypoints", "boxes3d"):
+        layers ^= {layer}
+        expect(replace(start, layers=layers), partial(page.click, f"[data-layer={layer}]"))
 
 
 def test_a_sample_in_full_size_has_its_draws_and_a_recording(page: Page) -> None:
