@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import boxes, sample, skeletons
-from gen_data.core.capture import LAYERS, Channel, SensorReading
+from gen_data.core import boxes, capture, sample, skeletons
+from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.preview.palette import (
     Rgb,
@@ -93,7 +93,7 @@ def channel_image(reading: SensorReading, channel: Channel) -> Image:
         KeyError: the reading does not have the channel.
     """
     image = reading.channels[channel]
-    if channel in LAYERS:
+    if channel in capture.LAYERS:
         image = np.concatenate(np.moveaxis(image, -1, 0), axis=1)
     return _SHOWN[channel](image) if channel in _SHOWN else color_ids(image)
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection
 from dataclasses import replace
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -162,7 +162,7 @@ class RgbCamera(Mounted):
         shutter = make_shutter(self.exposure, self.rolling_shutter)
         lens = self.nominal_intrinsics()
         mounted = add_camera(scene, self.name, self, lens, ev100=self.ev100, shutter=shutter)
-        return with_layers(mounted, self)
+        return with_layers(mounted, self.name, self.layers, self.media)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: streams.Rng
@@ -213,31 +213,17 @@ class RgbCamera(Mounted):
         return replace(reading, channels={**reading.channels, **pair})
 
 
-class LayeredCamera(Protocol):
-    """A camera that may write several surfaces along each ray."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def layers(self) -> int: ...
-    @property
-    def media(self) -> tuple[Channel, ...]: ...
-
-
 def check_layers(fields: Collection[str], channels: Collection[Channel]) -> None:
     """Raise ValueError if the field ``layers`` is set, but no channel has layers."""
     if "layers" in fields and not LAYERS.keys() & set(channels):
         raise ValueError(f"layers: no channel has any; add one of {', '.join(LAYERS)}")
 
 
-def with_layers(scene: Scene, sensor: LayeredCamera) -> Scene:
-    """The scene with a sensor's number of layers at its camera, if it writes any."""
-    if not LAYERS.keys() & set(sensor.media):
+def with_layers(scene: Scene, name: str, layers: int, channels: Collection[Channel]) -> Scene:
+    """The scene with a camera's number of layers, if it writes channels that have any."""
+    if not LAYERS.keys() & set(channels):
         return scene
-    cameras = (
-        replace(camera, layers=sensor.layers) if camera.name == sensor.name else camera
-        for camera in scene.cameras
-    )
+    cameras = (replace(c, layers=layers) if c.name == name else c for c in scene.cameras)
     return replace(scene, cameras=tuple(cameras))
 
 

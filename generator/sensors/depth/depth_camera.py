@@ -155,7 +155,7 @@ class DepthCamera(Mounted):
             ConfigError: the scene has no such rig.
         """
         mounted = rgb_camera.add_camera(scene, self.name, self, self.nominal_intrinsics())
-        return rgb_camera.with_layers(mounted, self)
+        return rgb_camera.with_layers(mounted, self.name, self.layers, self.media)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: streams.Rng

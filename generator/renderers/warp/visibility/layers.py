@@ -81,7 +81,7 @@ def trace_behind(frame: CameraView, channels: frozenset[Channel]) -> LaterSurfac
 def stack_layers(
     frame: CameraView, images: Mapping[Channel, NDArray[Any]], parts: Sequence[LaterSurfaces]
 ) -> dict[Channel, NDArray[Any]]:
-    """Layers [h, w, k] from the first ones [h, w] among images and the later ones in their parts."""
+    """Layers [h, w, k] of the first ones [h, w] among images and later ones in parts of them."""
     stacked = {}
     for channel in images.keys() & LAYERS.keys():
         first = images[channel]
