@@ -17,6 +17,9 @@ BYTES_PER_PIXEL = {
     "object_coordinates": 0.6,
     "measured_depth": 0.9,
     "infrared": 1.2,
+    "depth_layers": 0.8,
+    "instance_layers": 0.1,
+    "material_layers": 0.1,
 }
 """Sizes of PNG files, measured on tabletop and street; other channels are taken as 1."""
 

@@ -1,5 +1,6 @@
 """Readings of sensors: images, point clouds and measurements."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -66,7 +67,15 @@ class Channel(str, Enum):
     SCENE_FLOW            float32 [h, w, 3]       where the seen point is a step later, in the
                                                   camera frame of then, minus where it is now, in
                                                   that of now [m]; NaN
+    DEPTH_LAYERS          float32 [h, w, k]       Z_DEPTH of the surfaces along a ray; inf
+    INSTANCE_LAYERS       uint16 [h, w, k]        their instance ids; 0
+    MATERIAL_LAYERS       uint16 [h, w, k]        their materials: numbers in
+                                                  ``asset_types.LAYER_MATERIALS``; 0
     ====================  ======================  ==========================================
+
+    Layers are the surfaces that a straight ray meets up to the first one that nothing is seen
+    through, that one included: both sides of glass, but not the back of a box. The first layer is
+    Z_DEPTH or INSTANCE; there are as many as ``Camera.layers`` states.
 
     A sky is at infinity and has the flow that the camera's rotation gives it; ``u + FLOW`` is the
     image of ``p + SCENE_FLOW``. Flow is NaN where the lens has no image of the point then, and
@@ -94,6 +103,9 @@ class Channel(str, Enum):
     FLOW_OCCLUDED_FORWARD = "flow_occluded_forward"
     FLOW_OCCLUDED_BACKWARD = "flow_occluded_backward"
     SCENE_FLOW = "scene_flow"
+    DEPTH_LAYERS = "depth_layers"
+    INSTANCE_LAYERS = "instance_layers"
+    MATERIAL_LAYERS = "material_layers"
 
     def __str__(self) -> str:
         """The name in YAML and of folders."""
@@ -103,6 +115,19 @@ class Channel(str, Enum):
     def is_image(self) -> bool:
         """Whether it is one of ``SensorReading.channels``."""
         return self not in (Channel.AMODAL, Channel.SIGNAL)
+
+
+LAYERS: Mapping[Channel, float] = {
+    Channel.DEPTH_LAYERS: math.inf,
+    Channel.INSTANCE_LAYERS: 0,
+    Channel.MATERIAL_LAYERS: 0,
+}
+"""Channels of several surfaces along each ray, with the value where there is no further one."""
+
+LAYERS_MAX = 8
+"""Largest number of layers."""
+LAYERS_USUAL = 4
+"""Layers of cameras that state no number: a drinking glass has four surfaces."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

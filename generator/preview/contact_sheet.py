@@ -11,7 +11,7 @@ import numpy as np
 
 from gen_data.core import capture, errors, plugins, whole_files
 from gen_data.core.sample import Sample
-from gen_data.preview.overlay import Image, channel_image, draw_labels
+from gen_data.preview.overlay import Image, channel_image, draw_labels, layer_images
 from gen_data.preview.sensor_views import range_view, top_view
 from gen_data.preview.voxel_view import oblique_view
 from gen_data.sensors.lidar import pseudo_lidar
@@ -39,7 +39,7 @@ def make_tiles(
     views: Mapping[str, str] = MappingProxyType({}),
     width_px: int = 0,
 ) -> Iterator[Tile]:
-    """Yield one tile per sample, camera and channel, two per scan, and one of its occupancy.
+    """Yield a tile per sample, camera and channel or layer, two per scan, one of the occupancy.
 
     Args:
         samples: Samples to show.
@@ -58,6 +58,9 @@ def make_tiles(
                 if labels and channel is capture.Channel.RGB:
                     unit = reading.camera.intrinsics.width_px / width_px if width_px else 1.0
                     yield Tile(caption, draw_labels(reading, sample.truth[name], unit))
+                elif channel in capture.LAYERS:
+                    for number, image in enumerate(layer_images(reading, channel)):
+                        yield Tile(f"{name} {channel.value} {number}", image)
                 else:
                     yield Tile(caption, channel_image(reading, channel))
         for name, cloud in sorted(sample.capture.clouds.items()):

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import boxes, sample, skeletons
+from gen_data.core import boxes, capture, sample, skeletons
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.preview.palette import (
@@ -87,13 +87,20 @@ def draw_labels(
 
 
 def channel_image(reading: SensorReading, channel: Channel) -> Image:
-    """Convert any channel to a visible image, uint8 [h, w, 3].
+    """Convert any channel to a visible image, uint8 [h, w, 3]; layers are side by side.
 
     Raises:
         KeyError: the reading does not have the channel.
     """
     image = reading.channels[channel]
+    if channel in capture.LAYERS:
+        image = np.concatenate(np.moveaxis(image, -1, 0), axis=1)
     return _SHOWN[channel](image) if channel in _SHOWN else color_ids(image)
+
+
+def layer_images(reading: SensorReading, channel: Channel) -> list[Image]:
+    """The visible image of each layer of a channel, in colours that are the same in all of them."""
+    return np.split(channel_image(reading, channel), reading.channels[channel].shape[-1], axis=1)
 
 
 def _disparity(disparity_px: NDArray[Any]) -> Image:
@@ -115,6 +122,7 @@ _SHOWN: Mapping[Channel, Callable[[NDArray[Any]], Image]] = {
     Channel.Z_DEPTH: color_depth,
     Channel.RANGE: color_depth,
     Channel.MEASURED_DEPTH: color_depth,
+    Channel.DEPTH_LAYERS: color_depth,
     Channel.DISPARITY: _disparity,
     Channel.DISPARITY_VISIBLE: _disparity,
     Channel.INFRARED: grey_infrared,

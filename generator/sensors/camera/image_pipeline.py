@@ -266,10 +266,8 @@ def capture_photograph(
     reading = renderer.render(scene, camera, needed, *tones)
     radiance = reading.channels[capture.Channel.RADIANCE]
     depth_m = reading.channels.get(depth)
-    photo = develop(
-        radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng,
-        with_signal=capture.Channel.SIGNAL in channels,
-    )  # fmt: skip
+    shot = set_up_shot(radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng)
+    photo = develop_shot(*shot, with_signal=capture.Channel.SIGNAL in channels)
     images = {k: image for k, image in reading.channels.items() if k in channels}
     images[capture.Channel.RGB] = photo.rgb
     return replace(reading, channels=images, ev100=photo.ev100, signal=photo.signal)
@@ -293,18 +291,29 @@ def develop(
     pipeline: ImagePipeline,
     rng: streams.Rng,
     settings_rng: streams.Rng | None = None,
-    *,
-    with_signal: bool = False,
 ) -> Photograph:
     """Develop a photograph: meter the exposure, then apply all of ``STAGES`` in order.
 
     Arguments are as in ``Shot``; the depth is needed only by a pipeline with a focus. ``rng`` draws
     the noise, and the settings too unless another camera's stream is given for them.
-    ``with_signal`` states the expected signal as well; it changes nothing else.
 
     Raises:
         SampleError: a stage makes NaN or infinite values.
     """
+    shot, ev100 = set_up_shot(radiance, depth_m, camera, weather, pipeline, rng, settings_rng)
+    return develop_shot(shot, ev100)
+
+
+def set_up_shot(
+    radiance: Float32,
+    depth_m: NDArray[np.floating] | None,
+    camera: Camera,
+    weather: Weather,
+    pipeline: ImagePipeline,
+    rng: streams.Rng,
+    settings_rng: streams.Rng | None = None,
+) -> tuple[Shot, float]:
+    """The exposure of a photograph, set or metered, and its exposure value; see ``develop``."""
     noise_rng, rng = rng, (settings_rng or rng).of_sequence()
     ev100 = _set_or_metered(radiance, camera, pipeline)
     wanted = ev100 - _draw(pipeline, "exposure_compensation_ev", rng)
@@ -312,8 +321,17 @@ def develop(
     exposure = ExposureSettings(0.0, 1.0, wanted)
     if pipeline.image_sensor is not None:
         exposure = exposure_settings(wanted, pipeline.exposure_control)
-    shot = Shot(pipeline, camera, radiance, weather, depth_m, exposure, rng, noise_rng)
-    light, signal = Light(radiance, saturation_cd_m2(exposure.ev100)), None
+    return Shot(pipeline, camera, radiance, weather, depth_m, exposure, rng, noise_rng), ev100
+
+
+def develop_shot(shot: Shot, ev100: float, *, with_signal: bool = False) -> Photograph:
+    """Apply all of ``STAGES`` and the tone; ``with_signal`` adds the signal, and changes no byte.
+
+    Raises:
+        SampleError: a stage makes NaN or infinite values.
+    """
+    pipeline, exposure = shot.pipeline, shot.exposure
+    light, signal = Light(shot.radiance, saturation_cd_m2(exposure.ev100)), None
     for stage in STAGES:
         if with_signal and stage is _image_sensor and pipeline.image_sensor is not None:
             signal = _expected_signal(light, pipeline.image_sensor, shot)
@@ -321,7 +339,7 @@ def develop(
     if not np.isfinite(light.values).all():
         # The tone curve makes a bound of it.
         raise errors.SampleError(
-            f"{camera.name}.image_pipeline: a stage makes NaN or infinite values of finite "
+            f"{shot.camera.name}.image_pipeline: a stage makes NaN or infinite values of finite "
             f"radiance (exposure value {exposure.ev100:g}, gain {exposure.gain:g})"
         )
     rgb = _compress(_tone(light, shot), shot)

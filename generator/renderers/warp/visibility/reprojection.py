@@ -28,6 +28,7 @@ from gen_data.renderers.warp.visibility.frame_context import (
     render_view,
 )
 from gen_data.renderers.warp.visibility.label_images import draw_labels, empty_labels, read_images
+from gen_data.renderers.warp.visibility.layers import stack_layers, trace_behind
 
 RadianceFunction = Callable[[CameraView], wp.array]
 """Radiance of every pixel of a view [cd/m^2], flat, on the device."""
@@ -138,6 +139,7 @@ def render_bands(
     memory = Readback.allocate(pixels, _IMAGES, device)
     labels = empty_labels(channels, pixels, device)
     radiance = wp.empty(pixels, dtype=wp.vec3, device=device) if light else None
+    behind = []
     for band in bands:
         first, end = (band.first, band.end) if light is None else add_margin(band, lens.height_px)
         # Neighbouring bands share the most packed data.
@@ -150,9 +152,12 @@ def render_bands(
         if light is not None:
             copies.append((radiance, light(rendered)))
         place, begin = band.first * lens.width_px, (band.first - first) * lens.width_px
+        count = (band.end - band.first) * lens.width_px
         for image, part in copies:
-            wp.copy(image, part, place, begin, (band.end - band.first) * lens.width_px)
+            wp.copy(image, part, place, begin, count)
+        behind.append(trace_behind(rendered, channels).moved(begin, count, place))
     images = read_images(labels, lens.height_px, lens.width_px)
+    images |= stack_layers(reference, images, behind)
     return RenderedBands(BandedGBuffer(tuple(bands), memory), images, radiance)
 
 
