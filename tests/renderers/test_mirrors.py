@@ -116,7 +116,7 @@ def test_mirrors_of_a_rolling_shutter_show_each_row_at_its_instant() -> None:
     )  # fmt: skip
     ids = renderer.render(scene, scene.cameras[0], ALL).channels[Channel.SEEN_IN_MIRROR]
 
-    for row in range(25, 39):
+    for row in range(25, 39, 3):
         then = scene_at(scene, 0.05 * ((row + 0.5) / 64 - 0.5))
         camera = replace(then.cameras[0], shutter=INSTANT)
         expected = renderer.render(then, camera, ALL).channels[Channel.SEEN_IN_MIRROR][row]
@@ -145,7 +145,7 @@ def test_mirrors_in_a_room_agree_with_embree(method: str, seed: int) -> None:
         bodies.append(Body(f"b{k}", asset, pose, instance_id=k + 5))
     scene = Scene("room", tuple(bodies))
     pose = look_at((-2.4, -2.2, 1.8), (0.6, 0.6, 1.1))
-    camera = Camera("camera", pose, Intrinsics.from_hfov(160, 120, 1.4))
+    camera = Camera("camera", pose, Intrinsics.from_hfov(320, 240, 1.4))
     images = WarpRenderer(LIBRARY, "cpu", RenderSettings(visibility=method)).render(
         scene, camera, ALL
     ).channels  # fmt: skip
