@@ -69,6 +69,7 @@ WIDE = frozenset(
         capture.Channel.FLOW_FORWARD,
         capture.Channel.FLOW_BACKWARD,
         capture.Channel.SCENE_FLOW,
+        capture.Channel.MIRRORED_POSITION,
         capture.Channel.OBJECT_COORDINATES,
     }
 )

@@ -23,6 +23,9 @@ scene_flow            16-bit RGB             ``round(metres / depth_scale_m) + 3
 depth_layers,         16-bit grey            as depth or instance, numbers of materials; all layers
 instance_layers,                             below one another, the first on top: the image is as
 material_layers                              many times higher as there are layers
+seen_in_mirror        16-bit grey            the id; 0
+mirrored_position     16-bit RGB             ``round(metres / (8 depth_scale_m)) + 32768`` per axis;
+                                             (0, 0, 0) = nothing, or beyond 32767 units
 ====================  =====================  =====================================================
 
 Filters predict from the left pixel, for ids from the pixel above. Compression uses the highest
@@ -53,6 +56,8 @@ DEPTH_UNITS_MAX = 65_535
 """Largest value of a 16-bit depth image."""
 
 FLOW_UNITS_PER_PX = 64
+DEPTHS_PER_UNIT = {Channel.SCENE_FLOW: 1, Channel.MIRRORED_POSITION: 8}
+"""Units of depth per unit of other lengths: the world is larger than a view of it."""
 SIGNED_ZERO = 32_768
 """Value of 0 in 16-bit images of signed quantities."""
 
@@ -82,6 +87,8 @@ ENCODING = {
     Channel.DEPTH_LAYERS: (RowFilter.SUB, 1),
     Channel.INSTANCE_LAYERS: (RowFilter.UP, 2),
     Channel.MATERIAL_LAYERS: (RowFilter.UP, 2),
+    Channel.SEEN_IN_MIRROR: (RowFilter.UP, 2),
+    Channel.MIRRORED_POSITION: (RowFilter.SUB, 1),
 }
 """Row filter and compression level of each channel, measured on rendered images."""
 
@@ -160,6 +167,7 @@ PIXELS = {
     Channel.FLOW_OCCLUDED_FORWARD: (np.uint8, 1),
     Channel.FLOW_OCCLUDED_BACKWARD: (np.uint8, 1),
     Channel.SCENE_FLOW: (np.uint16, 3),
+    Channel.MIRRORED_POSITION: (np.uint16, 3),
 }
 """Type and number of components of the pixels in a file; other channels: uint16, 1."""
 
@@ -241,8 +249,8 @@ def _decode_pixels(channel: Channel, pixels: NDArray[Any], depth_scale_m: float)
             return np.asarray(pixels / 256.0, np.float32)
         case Channel.FLOW_FORWARD | Channel.FLOW_BACKWARD:
             return _decode_signed(pixels, 1.0 / FLOW_UNITS_PER_PX)[..., :2]
-        case Channel.SCENE_FLOW:
-            return _decode_signed(pixels, depth_scale_m)
+        case Channel.SCENE_FLOW | Channel.MIRRORED_POSITION:
+            return _decode_signed(pixels, DEPTHS_PER_UNIT[channel] * depth_scale_m)
         case Channel.FLOW_OCCLUDED_FORWARD | Channel.FLOW_OCCLUDED_BACKWARD:
             return np.asarray(pixels > 0, np.uint8)
         case Channel.NORMALS:
@@ -344,6 +352,9 @@ def _encode_pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) 
         Channel.FLOW_OCCLUDED_FORWARD: lambda: image * np.uint8(255),
         Channel.FLOW_OCCLUDED_BACKWARD: lambda: image * np.uint8(255),
         Channel.SCENE_FLOW: lambda: _signed_units(image, depth_scale_m),
+        Channel.MIRRORED_POSITION: lambda: _signed_units(
+            image, DEPTHS_PER_UNIT[channel] * depth_scale_m
+        ),
         Channel.NORMALS: lambda: np.rint((image + 1.0) * 0.5 * 255.0).astype(np.uint8),
         # Boxes are rounded to a micrometre: a surface may lie that much outside [0, 1], and
         # 65536 would wrap to 0.

@@ -38,7 +38,14 @@ NOT_NEGATIVE = frozenset(
 MAY_BE_INFINITE = frozenset(
     {Channel.Z_DEPTH, Channel.RANGE, Channel.MEASURED_DEPTH, Channel.DEPTH_LAYERS}
 )
-MAY_BE_NAN = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD, Channel.SCENE_FLOW})
+MAY_BE_NAN = frozenset(
+    {
+        Channel.FLOW_FORWARD,
+        Channel.FLOW_BACKWARD,
+        Channel.SCENE_FLOW,
+        Channel.MIRRORED_POSITION,
+    }
+)
 
 Fault = tuple[str, str]
 """Field, and what is wrong with it."""
@@ -152,7 +159,7 @@ def _image_faults(
     instances = {i.instance_id: i for i in scene.instances}
     counts = {
         channel: _count_ids(reading.channels[channel])
-        for channel in (Channel.INSTANCE, Channel.INSTANCE_LAYERS)
+        for channel in (Channel.INSTANCE, Channel.INSTANCE_LAYERS, Channel.SEEN_IN_MIRROR)
         if channel in reading.channels
     }
     for count in counts.values():

@@ -71,11 +71,16 @@ class Channel(str, Enum):
     INSTANCE_LAYERS       uint16 [h, w, k]        their instance ids; 0
     MATERIAL_LAYERS       uint16 [h, w, k]        their materials: numbers in
                                                   ``asset_types.LAYER_MATERIALS``; 0
+    SEEN_IN_MIRROR        uint16 [h, w]           id of the instance that a mirror shows; 0
+    MIRRORED_POSITION     float32 [h, w, 3]       where the point is that a mirror shows, in the
+                                                  world frame [m]; NaN
     ====================  ======================  ==========================================
 
     Layers are the surfaces that a straight ray meets up to the first one that nothing is seen
     through, that one included: both sides of glass, but not the back of a box. The first layer is
-    Z_DEPTH or INSTANCE; there are as many as ``Camera.layers`` states.
+    Z_DEPTH or INSTANCE; there are as many as ``Camera.layers`` states. Mirrors are the mirrors of
+    LAYER_MATERIALS that a ray ends at, also behind glass, and show the first surface on the ray
+    that they reflect.
 
     A sky is at infinity and has the flow that the camera's rotation gives it; ``u + FLOW`` is the
     image of ``p + SCENE_FLOW``. Flow is NaN where the lens has no image of the point then, and
@@ -106,6 +111,8 @@ class Channel(str, Enum):
     DEPTH_LAYERS = "depth_layers"
     INSTANCE_LAYERS = "instance_layers"
     MATERIAL_LAYERS = "material_layers"
+    SEEN_IN_MIRROR = "seen_in_mirror"
+    MIRRORED_POSITION = "mirrored_position"
 
     def __str__(self) -> str:
         """The name in YAML and of folders."""
@@ -123,6 +130,12 @@ LAYERS: Mapping[Channel, float] = {
     Channel.MATERIAL_LAYERS: 0,
 }
 """Channels of several surfaces along each ray, with the value where there is no further one."""
+
+MIRRORED: Mapping[Channel, NDArray[Any]] = {
+    Channel.SEEN_IN_MIRROR: np.zeros((), np.uint16),
+    Channel.MIRRORED_POSITION: np.full(3, np.nan, np.float32),
+}
+"""Channels of what mirrors show, with the value of a pixel without a mirrored surface."""
 
 LAYERS_MAX = 8
 """Largest number of layers."""

@@ -47,6 +47,8 @@ NOTHING: Mapping[Channel, float] = {
     Channel.CATEGORY: 0,
     Channel.OBJECT_COORDINATES: 0,
     Channel.SCENE_FLOW: np.nan,
+    Channel.SEEN_IN_MIRROR: 0,
+    Channel.MIRRORED_POSITION: np.nan,
     **LAYERS,
 }
 """Channels that can be rectified, with the value of a pixel whose ray the original does not show.

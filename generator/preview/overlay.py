@@ -16,6 +16,7 @@ from gen_data.preview.palette import (
     color_depth,
     color_flow,
     color_ids,
+    color_positions,
     grey_infrared,
     id_color,
 )
@@ -128,6 +129,7 @@ _SHOWN: Mapping[Channel, Callable[[NDArray[Any]], Image]] = {
     Channel.INFRARED: grey_infrared,
     Channel.NORMALS: lambda normals: np.round((normals + 1.0) * 127.5).astype(np.uint8),
     Channel.OBJECT_COORDINATES: lambda places: np.round(places * 255.0).astype(np.uint8),
+    Channel.MIRRORED_POSITION: color_positions,
     Channel.FLOW_FORWARD: color_flow,
     Channel.FLOW_BACKWARD: color_flow,
     Channel.SCENE_FLOW: _flow_from_above,

@@ -167,6 +167,20 @@ def test_layers_behind_glass_have_labels_where_the_ground_has() -> None:
     assert not np.isfinite(depth_m[:, : SIZE_PX[0] // 2]).any(), "the foreground hides all layers"
 
 
+def test_mirrors_behind_the_foreground_show_nothing() -> None:
+    scene = world(cube=True, photo=True)
+    silver = Material((0.9, 0.9, 0.9), 0.02, metallic=1.0)
+    ground, cube = scene.bodies
+    scene = replace(scene, bodies=(ground, replace(cube, materials=(silver,))))
+    wanted = frozenset({Channel.MIRRORED_POSITION, Channel.INSTANCE})
+    images = seen(PlateLibrary(empty_photo(), half_mask()), scene, wanted).channels
+    shown = np.isfinite(images[Channel.MIRRORED_POSITION]).all(axis=-1)
+    assert shown.any() and (images[Channel.INSTANCE][shown] == 1).all()
+    assert not shown[:, : SIZE_PX[0] // 2].any()
+    # All sides of the cube stand on the ground, at height 0.
+    assert np.abs(images[Channel.MIRRORED_POSITION][shown][:, 2]).max() < 1e-3
+
+
 def half_mask() -> NDArray[np.uint8]:
     mask = np.zeros(SIZE_PX[::-1], np.uint8)
     mask[:, : SIZE_PX[0] // 2] = 255

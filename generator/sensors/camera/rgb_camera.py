@@ -33,7 +33,8 @@ Image = Literal[
     Channel.CATEGORY, Channel.OBJECT_COORDINATES, Channel.DISPARITY, Channel.DISPARITY_VISIBLE,
     Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_FORWARD,
     Channel.FLOW_OCCLUDED_BACKWARD, Channel.SCENE_FLOW, Channel.DEPTH_LAYERS,
-    Channel.INSTANCE_LAYERS, Channel.MATERIAL_LAYERS,
+    Channel.INSTANCE_LAYERS, Channel.MATERIAL_LAYERS, Channel.SEEN_IN_MIRROR,
+    Channel.MIRRORED_POSITION,
 ]  # fmt: skip
 """Channels that can be written as images; see ``gen_data.core.capture.Channel``."""
 

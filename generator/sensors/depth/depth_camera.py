@@ -74,7 +74,8 @@ OWN = frozenset({Channel.MEASURED_DEPTH, Channel.INFRARED})
 DepthImage = Literal[
     Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.RGB, Channel.Z_DEPTH, Channel.RANGE,
     Channel.NORMALS, Channel.INSTANCE, Channel.PART, Channel.CATEGORY, Channel.OBJECT_COORDINATES,
-    Channel.DEPTH_LAYERS, Channel.INSTANCE_LAYERS, Channel.MATERIAL_LAYERS,
+    Channel.DEPTH_LAYERS, Channel.INSTANCE_LAYERS, Channel.MATERIAL_LAYERS, Channel.SEEN_IN_MIRROR,
+    Channel.MIRRORED_POSITION,
 ]  # fmt: skip
 """Channels that can be written as images; all but the first two are ground truth."""
 

@@ -27,7 +27,8 @@ _LAYER_MATERIAL = np.array(
     np.uint16,
 )
 SEE_THROUGH = LAYER_MATERIALS.index("see_through")
-"""Number of materials behind which a ray continues."""
+MIRROR = LAYER_MATERIALS.index("mirror")
+"""Numbers of materials behind which a ray continues, and that reflect it."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -125,7 +126,7 @@ def layer_materials(per_body: Sequence[BodyMaterials]) -> NDArray[np.uint16]:
     numbers = np.zeros(len(surfaces), np.uint16)
     if sum(len(entry.roles) for entry in per_body):
         numbers = _LAYER_MATERIAL[np.concatenate([entry.roles for entry in per_body])]
-    numbers[is_mirror(surfaces)] = LAYER_MATERIALS.index("mirror")
+    numbers[is_mirror(surfaces)] = MIRROR
     numbers[is_see_through(surfaces)] = SEE_THROUGH
     return numbers
 

@@ -1,6 +1,7 @@
 """Label images, which the ray through each pixel's centre decides."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Scene
 from gen_data.renderers.warp.readback import Readback
 from gen_data.renderers.warp.scene.kernels import records
-from gen_data.renderers.warp.visibility import layers
+from gen_data.renderers.warp.visibility import layers, mirrors
 from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.kernels import label_resolve
 from gen_data.renderers.warp.visibility.plates import hide_labels
@@ -22,7 +23,27 @@ def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channe
     """All requested label channels, as documented at Channel."""
     drawn = draw_labels(frame, channels)
     images = read_images(drawn, frame.view.height, frame.view.width)
-    return images | layers.stack_layers(frame, images, [layers.trace_behind(frame, channels)])
+    parts = trace_further(frame, channels)
+    return images | further_images(frame, images, parts, channels)
+
+
+def trace_further(
+    frame: CameraView, channels: frozenset[Channel]
+) -> tuple[layers.SparseLabels, ...]:
+    """Requested labels of surfaces that a frame shows through glass and in mirrors."""
+    return layers.trace_behind(frame, channels), mirrors.trace_mirrors(frame, channels)
+
+
+def further_images(
+    frame: CameraView,
+    images: Mapping[Channel, NDArray[Any]],
+    parts: Sequence[layers.SparseLabels],
+    channels: frozenset[Channel],
+) -> dict[Channel, NDArray[Any]]:
+    """Images of layers and mirrors: first layers are among images, further labels in parts."""
+    lens = frame.state.camera.intrinsics
+    mirrored = mirrors.mirror_images(channels, parts, lens.height_px, lens.width_px)
+    return layers.stack_layers(frame, images, parts) | mirrored
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -20,66 +20,82 @@ from gen_data.renderers.warp.visibility.kernels import surface_layers
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class LaterSurfaces:
-    """Surfaces behind the first one.
+class SparseLabels:
+    """Labels of some pixels of an image.
 
     Attributes:
-        pixels: Flat places in the image of rays that meet any, [n].
-        values: By channel, of each ray's later surfaces, nothing after the last, [n, k].
+        pixels: Flat places of the pixels, [n].
+        values: By channel, [n, ...].
     """
 
     pixels: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
     values: Mapping[Channel, NDArray[Any]] = field(default_factory=dict)
 
-    def moved(self, begin: int, count: int, place: int) -> "LaterSurfaces":
-        """The surfaces at ``count`` pixels from ``begin`` on, as those from ``place`` on."""
+    def moved(self, begin: int, count: int, place: int) -> "SparseLabels":
+        """The labels of ``count`` pixels from ``begin`` on, as of the pixels from ``place`` on."""
         kept = (self.pixels >= begin) & (self.pixels < begin + count)
         values = {channel: value[kept] for channel, value in self.values.items()}
-        return LaterSurfaces(self.pixels[kept] + (place - begin), values)
+        return SparseLabels(self.pixels[kept] + (place - begin), values)
 
 
 def draw_materials(frame: CameraView, image: wp.array) -> None:
     """Material of the first surface at every pixel; see ``LAYER_MATERIALS``."""
-    inputs = [frame.world.record, frame.gbuffer.hits, _materials(frame)]
+    inputs = [frame.world.record, frame.gbuffer.hits, materials_of(frame)]
     frame.launch(surface_layers.label_materials, frame.pixels, inputs, [image])
 
 
-def trace_behind(frame: CameraView, channels: frozenset[Channel]) -> LaterSurfaces:
-    """Later surfaces of all pixels of a frame; none if no channel of layers is requested."""
+def trace_behind(frame: CameraView, channels: frozenset[Channel]) -> SparseLabels:
+    """Surfaces behind the first one, [n, layers - 1]; none if no channel of layers is requested."""
     wanted, later = channels & LAYERS.keys(), _layers_of(frame) - 1
-    if not wanted or not later or not frame.world.layered:
-        return LaterSurfaces()
-    device, materials = frame.cache.device, _materials(frame)
-    count = wp.zeros(1, dtype=int, device=device)
-    listed = frame.cache.scratch("see-through pixels", frame.pixels, int)
-    inputs = [frame.world.record, frame.gbuffer.hits, materials, material_packing.SEE_THROUGH]
-    frame.launch(surface_layers.list_see_through, frame.pixels, inputs, [count, listed])
-    listed = listed[: int(count.numpy()[0])]
+    if not wanted or not later:
+        return SparseLabels()
+    listed = list_pixels(frame, (material_packing.SEE_THROUGH,))
     if not len(listed):
-        return LaterSurfaces()
+        return SparseLabels()
     shape = (len(listed), later)
-    found = Readback.allocate(len(listed) * later, (wp.vec2i, float), device)
-    inputs = [frame.view, *inputs, listed, frame.gbuffer.z_m]
+    found = Readback.allocate(len(listed) * later, (wp.vec2i, float), frame.cache.device)
     outputs = [part.reshape(shape) for part in found.parts]
-    frame.launch(surface_layers.trace_behind, len(listed), inputs, outputs)
+    frame.launch(surface_layers.trace_behind, len(listed), ray_inputs(frame, listed), outputs)
     hits, z_m = found.numpy()
     pixels = listed.numpy().astype(np.intp)
     bodies, slots = np.moveaxis(hits.reshape(*shape, 2), -1, 0).astype(np.intp)
     there = bodies >= 0
     if frame.context.backdrop is not None:
         there &= ~plates.is_hidden(frame, frame.context.backdrop, pixels, bodies)
-    instances = np.array([*(b.instance_id for b in frame.state.scene.bodies), 0], np.uint16)
     images: dict[Channel, Callable[[], NDArray[Any]]] = {
         Channel.DEPTH_LAYERS: lambda: z_m.reshape(shape),
-        Channel.INSTANCE_LAYERS: lambda: instances[bodies],
-        Channel.MATERIAL_LAYERS: lambda: materials.numpy()[slots],
+        Channel.INSTANCE_LAYERS: lambda: instances_of(frame)[bodies],
+        Channel.MATERIAL_LAYERS: lambda: materials_of(frame).numpy()[slots],
     }
-    values = {c: np.where(there, images[c](), LAYERS[c]) for c in wanted}
-    return LaterSurfaces(pixels, values)
+    return SparseLabels(pixels, {c: np.where(there, images[c](), LAYERS[c]) for c in wanted})
+
+
+def list_pixels(frame: CameraView, materials: tuple[int, ...]) -> wp.array:
+    """Pixels whose first surface has one of two materials, in any order; scratch memory."""
+    listed = frame.cache.scratch("pixels by material", frame.pixels, int)
+    if not frame.world.layered:
+        return listed[:0]
+    count = wp.zeros(1, dtype=int, device=frame.cache.device)
+    inputs = [frame.world.record, frame.gbuffer.hits, materials_of(frame)]
+    wanted = [materials[0], materials[-1]]
+    frame.launch(surface_layers.list_pixels, frame.pixels, [*inputs, *wanted], [count, listed])
+    return listed[: int(count.numpy()[0])]
+
+
+def ray_inputs(frame: CameraView, listed: wp.array) -> list[Any]:
+    """Inputs of kernels that follow the rays of listed pixels behind the first surface."""
+    seen = [frame.gbuffer.hits, frame.gbuffer.z_m]
+    materials = [materials_of(frame), material_packing.SEE_THROUGH]
+    return [frame.view, frame.world.record, *seen, *materials, listed]
+
+
+def instances_of(frame: CameraView) -> NDArray[np.uint16]:
+    """Instance id of each body, and 0 for number -1."""
+    return np.array([*(b.instance_id for b in frame.state.scene.bodies), 0], np.uint16)
 
 
 def stack_layers(
-    frame: CameraView, images: Mapping[Channel, NDArray[Any]], parts: Sequence[LaterSurfaces]
+    frame: CameraView, images: Mapping[Channel, NDArray[Any]], parts: Sequence[SparseLabels]
 ) -> dict[Channel, NDArray[Any]]:
     """Layers [h, w, k] of the first ones [h, w] among images and later ones in parts of them."""
     stacked = {}
@@ -88,7 +104,7 @@ def stack_layers(
         layers = np.full((_layers_of(frame), first.size), LAYERS[channel], first.dtype)
         layers[0] = first.reshape(-1)
         for part in parts:
-            if len(part.pixels):
+            if channel in part.values:
                 layers[1:, part.pixels] = part.values[channel].T
         stacked[channel] = np.moveaxis(layers.reshape(-1, *first.shape), 0, -1)
     return stacked
@@ -98,7 +114,7 @@ def _layers_of(frame: CameraView) -> int:
     return frame.state.camera.layers or LAYERS_USUAL
 
 
-def _materials(frame: CameraView) -> wp.array:
+def materials_of(frame: CameraView) -> wp.array:
     """Number of each material in ``LAYER_MATERIALS``, on the device."""
     bodies, cache = frame.state.scene.bodies, frame.cache
 

@@ -1,13 +1,16 @@
-"""Surfaces behind see-through ones, along the straight rays of pixels."""
+"""Surfaces behind see-through ones and in mirrors, on the rays of pixels."""
 
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels import ray_queries, records
+from gen_data.renderers.warp.visibility.kernels import label_resolve
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Limit on the queries of one ray; it bounds the loop, not the image.
 QUERIES_MAX = wp.constant(64)
+# Least sine of the angle between a reflected ray and a face.
+LIFT = wp.constant(1.0e-3)
 
 
 @wp.kernel
@@ -26,28 +29,60 @@ def label_materials(
 
 
 @wp.kernel
-def list_see_through(
+def list_pixels(
     world: records.World,
     hits: wp.array[wp.vec2i],
     materials: wp.array[wp.uint16],
-    see_through: int,
+    one: int,
+    other: int,
     count: wp.array[int],
     pixels: wp.array[int],
 ):
-    """List the pixels whose first surface is see-through, in any order.
+    """List the pixels whose first surface has one of two materials, in any order.
 
     Args:
         world: The scene.
         hits: First surface of every pixel.
         materials: Number of each material.
-        see_through: Number of those that rays continue behind.
+        one, other: Numbers of the wanted ones.
         count: Length of the list; 0 at first.
         pixels: The list.
     """
     i = wp.tid()
     if hits[i][0] >= 0:
-        if int(materials[records.surface_index(world, hits[i])]) == see_through:
+        material = int(materials[records.surface_index(world, hits[i])])
+        wanted = material == one
+        if material == other:
+            wanted = True
+        if wanted:
             pixels[wp.atomic_add(count, 0, 1)] = i
+
+
+@wp.func
+def surface_behind(
+    view: records.View, world: records.World, before: wp.vec2i, p: wp.vec3, d: wp.vec3
+):
+    """The next (body, face) on a ray from a point of another one, and its point.
+
+    Args:
+        view, world: Camera and scene.
+        before: The (body, face) of the point.
+        p: The point.
+        d: Unit direction.
+    """
+    at = before
+    origin = p
+    queries = int(0)
+    # A flat face is met once: a second time is rounding.
+    while at[0] == before[0] and at[1] == before[1] and queries < QUERIES_MAX:
+        origin = ray_queries.passed_origin(origin, d, view.eye_m)
+        met = ray_queries.closest_hit(world, origin, d, ray_queries.FARTHEST, records.HOLES)
+        origin = origin + d * met.t
+        at = met.at
+        queries += 1
+    if queries == QUERIES_MAX:
+        at = wp.vec2i(-1, -1)
+    return at, origin
 
 
 @wp.kernel
@@ -55,10 +90,10 @@ def trace_behind(
     view: records.View,
     world: records.World,
     hits: wp.array[wp.vec2i],
+    depths: wp.array[float],
     materials: wp.array[wp.uint16],
     see_through: int,
     pixels: wp.array[int],
-    depths: wp.array[float],
     behind: wp.array2d[wp.vec2i],
     z_m: wp.array2d[float],
 ):
@@ -66,8 +101,10 @@ def trace_behind(
 
     Args:
         view, world: Camera and scene.
-        hits, materials, see_through, pixels: As for ``list_see_through``.
-        depths: Of the first surfaces, as of GBuffer.
+        hits, depths: First surface of every pixel, as of GBuffer.
+        materials: Number of each material.
+        see_through: Number of those that rays continue behind.
+        pixels: The list.
         behind: (body, material) of each ray's later surfaces; (-1, -1) for none.
         z_m: Their depths along the optical axis.
     """
@@ -82,26 +119,72 @@ def trace_behind(
     for layer in range(behind.shape[1]):
         behind[k, layer] = wp.vec2i(-1, -1)
     p = view.eye_m + way * depths[i]
-    before = hits[i]
+    at = hits[i]
     layer = int(0)
-    queries = int(0)
     going = bool(True)
     while going:
-        origin = ray_queries.passed_origin(p, d, view.eye_m)
-        met = ray_queries.closest_hit(world, origin, d, ray_queries.FARTHEST, records.HOLES)
-        queries += 1
+        at, p = surface_behind(view, world, at, p, d)
         going = False
-        if met.at[0] >= 0:
-            p = origin + d * met.t
-            surface = records.surface_index(world, met.at)
-            # A flat face is met once: a second time is rounding.
-            if met.at[0] != before[0] or met.at[1] != before[1]:
-                z = wp.dot(p - view.eye_m, d) * slope
-                if not z > 0.0:
-                    z = wp.inf
-                behind[k, layer] = wp.vec2i(met.at[0], surface)
-                z_m[k, layer] = z
-                layer += 1
-            before = met.at
+        if at[0] >= 0:
+            surface = records.surface_index(world, at)
+            z = wp.dot(p - view.eye_m, d) * slope
+            if not z > 0.0:
+                z = wp.inf
+            behind[k, layer] = wp.vec2i(at[0], surface)
+            z_m[k, layer] = z
+            layer += 1
             going = int(materials[surface]) == see_through and layer < behind.shape[1]
-            going = going and queries < QUERIES_MAX
+
+
+@wp.kernel
+def trace_mirrors(
+    view: records.View,
+    world: records.World,
+    hits: wp.array[wp.vec2i],
+    depths: wp.array[float],
+    materials: wp.array[wp.uint16],
+    see_through: int,
+    pixels: wp.array[int],
+    mirror: int,
+    mirrors: wp.array[int],
+    mirrored: wp.array[int],
+    places_m: wp.array[wp.vec3],
+):
+    """The first surface on the ray that a mirror reflects, at listed pixels.
+
+    Args:
+        view, world, hits, depths, materials, see_through, pixels: As for ``trace_behind``.
+        mirror: Number of mirrors.
+        mirrors: Body of the mirror that each pixel shows, also through glass; -1 for none.
+        mirrored: Body that is seen in it; -1 for none.
+        places_m: The point that is seen, in the world.
+    """
+    k = wp.tid()
+    i = pixels[k]
+    way = records.pixel_ray(view, i)
+    d = records.fast_normalize(way)
+    p = view.eye_m + way * depths[i]
+    at = hits[i]
+    going = bool(True)
+    while going:
+        going = False
+        if int(materials[records.surface_index(world, at)]) == see_through:
+            at, p = surface_behind(view, world, at, p, d)
+            going = at[0] >= 0
+    mirrors[k] = -1
+    mirrored[k] = -1
+    if at[0] >= 0:
+        if int(materials[records.surface_index(world, at)]) == mirror:
+            mirrors[k] = at[0]
+            x = float(i % view.width) + 0.5
+            y = float(i / view.width) + 0.5
+            n = label_resolve.point_at(view, world, at, x, y).normal
+            r = d - n * (2.0 * wp.dot(n, d))
+            # Smooth normals of curved mirrors may send rays below a face.
+            face = label_resolve.make_facet(world, at).across
+            g = view.R_world_camera @ records.fast_normalize(face)
+            g = g * wp.where(wp.dot(g, d) > 0.0, -1.0, 1.0)
+            r = records.fast_normalize(r + g * wp.max(LIFT - wp.dot(r, g), 0.0))
+            shown, place = surface_behind(view, world, at, p, r)
+            mirrored[k] = shown[0]
+            places_m[k] = place
