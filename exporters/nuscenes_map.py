@@ -41,6 +41,8 @@ from gen_data.exporters.road_map import Area, Block, Divider, Paint, RoadMap, Si
 VERSION = "1.3"
 DECIMALS = 4
 LANE_TYPES = {"driving": "CAR", "bicycle": "BIKE"}
+AREAS = {"crosswalk": "ped_crossing", "sidewalk": "walkway", "parking": "carpark_area"}
+"""Layers of areas by kind of lane."""
 CROSSING_NEAR_M = 6.0
 """A crosswalk this near behind a stop line belongs to it."""
 
@@ -125,21 +127,10 @@ class _Writer:
                 road_segment_token=self._named("road_segment", block.segment),
             )
         for lane in self.roads.lanes:
-            polygon = {"crosswalk": "ped_crossing", "sidewalk": "walkway",
-                       "parking": "carpark_area"}.get(lane.kind)  # fmt: skip
-            if polygon is None:
-                continue
-            more: Row = {}
-            if polygon == "ped_crossing":
-                segment = self.roads.segment_at(_middle(lane))
-                more = {"road_segment_token": self._named("road_segment", segment)}
-            elif polygon == "carpark_area":
-                more = {
-                    "orientation": round(_yaw(lane), DECIMALS),
-                    "road_block_token": self._block_near(lane),
-                }
-            own = self._polygon(lane_area([lane]), polygon, lane.name)
-            self._row(polygon, lane.name, polygon_token=own, **more)
+            if lane.kind in AREAS:
+                layer, more = AREAS[lane.kind], self._area_facts(lane)
+                own = self._polygon(lane_area([lane]), layer, lane.name)
+                self._row(layer, lane.name, polygon_token=own, **more)
 
     def add_lanes(self) -> None:
         """Add lanes, connectors, their links and their centre lines."""
@@ -223,6 +214,16 @@ class _Writer:
                 ped_crossing_tokens=[self.token("ped_crossing", n) for n in crossings],
                 road_block_token=self.token("road_block", name),
             )
+
+    def _area_facts(self, lane: Lane) -> Row:
+        """Facts of a crosswalk or a parking strip."""
+        if lane.kind == "crosswalk":
+            segment = self.roads.segment_at(_middle(lane))
+            return {"road_segment_token": self._named("road_segment", segment)}
+        if lane.kind == "parking":
+            turn = round(_yaw(lane), DECIMALS)
+            return {"orientation": turn, "road_block_token": self._block_near(lane)}
+        return {}
 
     def _row(self, layer: str, name: object, **values: Any) -> None:
         self.layers[layer].append({"token": self.token(layer, name), **values})
@@ -360,10 +361,11 @@ def _ends_beside(one: Block, other: Block) -> bool:
     """Whether two blocks of a road end side by side: lanes ahead, and lanes that turn."""
     if one.segment != other.segment:
         return False
-    borders = [border_line(b.lanes[k], side)[-1] for b in (one, other)
-               for k, side in ((0, "left"), (-1, "right"))]  # fmt: skip
-    gaps = math.dist(borders[1], borders[2]), math.dist(borders[3], borders[0])
-    return min(gaps) < MEETING_M
+    left, right = (
+        [border_line(block.lanes[0], "left")[-1], border_line(block.lanes[-1], "right")[-1]]
+        for block in (one, other)
+    )
+    return min(math.dist(left[1], right[0]), math.dist(right[1], left[0])) < MEETING_M
 
 
 def _behind(block: Block, lanes: Iterable[Lane]) -> Iterator[str]:
