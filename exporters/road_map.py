@@ -163,10 +163,7 @@ def road_map(scene: Scene, assets: AssetLibrary) -> RoadMap:
     lanes = tuple(lane for lane in scene.lanes if len(lane.center_m) > 1)
     bodies = [_level(body) for body in ground_bodies(scene)]
     plans = {body.name: _union(surface(body, assets, PAVED)[0]) for body in bodies}
-    marks = [surface(body, assets, PAINT) for body in bodies]
-    triangles = np.concatenate([np.zeros((0, 3, 2)), *(found[0][..., :2] for found in marks)])
-    yellow = np.concatenate([np.zeros(0, np.bool_), *(found[1] for found in marks)])
-    paint = PaintIndex(triangles, yellow)
+    paint = _paint(bodies, assets)
     driving = [lane for lane in lanes if lane.kind == "driving"]
     segments = tuple(_segments(driving, plans))
     blocks = tuple(_blocks(driving, segments))
@@ -176,13 +173,15 @@ def road_map(scene: Scene, assets: AssetLibrary) -> RoadMap:
         tuple(_areas(_join(plans.values()))),
         segments,
         blocks,
-        tuple(
-            Divider(border, paint.along(np.asarray(border.points_m)[:, :2]))
-            for border in lane_borders(scene.lanes)
-        ),
+        tuple(paint.divider(border) for border in lane_borders(scene.lanes)),
         tuple(line for line in stop_lines if line is not None),
         tuple(_signals(scene, assets, blocks)),
     )
+
+
+def find_paint(scene: Scene, assets: AssetLibrary) -> "PaintIndex":
+    """All paint of a street."""
+    return _paint([_level(body) for body in ground_bodies(scene)], assets)
 
 
 def lane_area(lanes: Sequence[Lane]) -> Area:
@@ -206,7 +205,13 @@ class PaintIndex:
         import shapely
 
         near = np.sort(self._tree.query(area, predicate="intersects"))
-        return shapely.union_all(shapely.polygons(self.triangles[near].round(DECIMALS))).intersection(area)
+        return shapely.union_all(
+            shapely.polygons(self.triangles[near].round(DECIMALS))
+        ).intersection(area)
+
+    def divider(self, border: LaneBorder) -> Divider:
+        """A border and its paint."""
+        return Divider(border, self.along(np.asarray(border.points_m)[:, :2]))
 
     def along(self, line: Array) -> tuple[Paint, ...]:
         """Paint of a border [n, 2] at each of its points."""
@@ -265,6 +270,12 @@ def _covered(
     np.add.at(steps, first, 1)
     np.add.at(steps, last, -1)
     return np.asarray(np.cumsum(steps)[:-1] > 0)
+
+
+def _paint(bodies: Iterable[Body], assets: AssetLibrary) -> PaintIndex:
+    marks = [surface(body, assets, PAINT) for body in bodies]
+    triangles = np.concatenate([np.zeros((0, 3, 2)), *(found[0][..., :2] for found in marks)])
+    return PaintIndex(triangles, np.concatenate([np.zeros(0, np.bool_), *(m[1] for m in marks)]))
 
 
 def _level(body: Body) -> Body:
