@@ -67,7 +67,7 @@ class SurfacePoints:
                     if _same_triangles(assets.mesh(asset), now):
                         own = rows.start + np.flatnonzero(np.array(known) == asset)
                         found[own] = _interpolate(now, self.face[own], self.weights[own])
-        return found * scales
+        return np.asarray(found * scales)
 
     def in_world(self, scene: Scene, p_body: se3.Array) -> se3.Array:
         """World coordinates [m] of ``on_bodies``, [n, 3]."""

@@ -22,7 +22,7 @@ from gen_data.core.streams import Rng
 
 INSTANTS = 3
 """Steps of a sequence at which points are chosen, evenly spread from the first to the last."""
-CANDIDATES = 4
+CANDIDATES = 16
 """Rays per point: those that hit nothing or glass find none."""
 FAR_M = 2000.0
 OUTSIDE, BEHIND = TRACK_STATES.index("outside"), TRACK_STATES.index("behind")
@@ -222,7 +222,7 @@ def _rolling_lines(
         for track, rows in movers:
             R, t = track.poses(scene.time_s + delays_s[rows])
             places[rows] = np.einsum("nij,nj->ni", R, p_body[rows], optimize=False) + t
-        return places
+        return np.asarray(places)
 
     _, image_px, delays_s = project_moving_points(scene, camera, world, len(p_body))
     _, eyes = camera_poses(scene, camera, delays_s)

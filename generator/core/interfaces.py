@@ -18,8 +18,9 @@ Every member of a Protocol below is required. Base classes provide those that fe
 The kind ``asset_family`` differs: its entry points name instances of
 ``gen_data.assets.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
 
-Forbidden operations are impossible by design: randomizers get no engine, annotators no rng, and
-exporters process one shard at a time and compute ids instead of counting.
+Forbidden operations are impossible by design: randomizers get no engine, annotators no rng (except
+annotators of sequences, which choose once per view), and exporters process one shard at a time and
+compute ids instead of counting.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

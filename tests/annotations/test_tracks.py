@@ -21,6 +21,8 @@ from gen_data.core.scene_time import scene_at
 from gen_data.core.se3 import SE3, Array, look_at
 from gen_data.core.shutter import INSTANT, Shutter
 from gen_data.core.streams import Streams
+from gen_data.exporters.base import Rectify
+from gen_data.pipeline.rectification import rectification, rectified_tracks
 from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.embree import RayCaster, placed
 from tests.libraries import library
@@ -218,6 +220,20 @@ def test_a_wide_lens_sees_points_where_its_model_puts_them() -> None:
     expected = np.stack([x, y], axis=1) * (80.0 * angle / level)[:, None] + [48.0, 32.0]
     np.testing.assert_allclose(seen.image_px, expected, atol=1e-3)
     assert set(seen.state) == {VISIBLE}
+
+
+def test_rectified_points_are_where_the_pinhole_has_them() -> None:
+    """K p / z of the points in the camera's frame; points beside the new image are outside."""
+    lens = replace(LENS, lens=Lens("kannala_brandt", (0.0, 0.0, 0.0, 0.0), 1.5))
+    (tracks,) = followed(world(WALL, lens=lens), steps=1)
+    bent = rectification(lens, Rectify(hfov_deg=40.0))
+    seen = rectified_tracks(camera(tracks), bent)
+    image = seen.position_m @ bent.target.matrix().T
+    expected = image[:, :2] / image[:, 2:]
+    np.testing.assert_allclose(seen.image_px, expected, atol=2e-3)
+    inside = ((expected >= 0.0) & (expected < (96, 64))).all(axis=1)
+    assert 5 < inside.sum() < 55
+    assert (seen.state == np.where(inside, VISIBLE, OUTSIDE)).all()
 
 
 @pytest.mark.parametrize("readout_s", [0.04, -0.04])
