@@ -48,10 +48,9 @@ class SurfacePoints:
 
     def by_body(self) -> Iterator[tuple[int, slice]]:
         """Index of each body with points, and their rows."""
-        bodies, starts = np.unique(self.body, return_index=True)
-        ends = [*starts[1:].tolist(), len(self.body)]
-        for body, start, end in zip(bodies.tolist(), starts.tolist(), ends, strict=True):
-            yield body, slice(start, end)
+        bodies, starts, counts = np.unique(self.body, return_index=True, return_counts=True)
+        for body, start, count in zip(*(a.tolist() for a in (bodies, starts, counts)), strict=True):
+            yield body, slice(start, start + count)
 
     def on_bodies(self, scene: Scene, assets: AssetLibrary) -> se3.Array:
         """Positions in the frames of the bodies as they are in a scene [m], scaled, [n, 3]."""

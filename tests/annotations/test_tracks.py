@@ -271,6 +271,12 @@ def test_a_scene_without_a_camera_is_refused() -> None:
         Tracks().begin(view)
 
 
+def test_where_nothing_is_in_view_there_are_no_points() -> None:
+    (tracks,) = followed(replace(world(), bodies=world().bodies[-1:]), steps=1)
+    assert tracks.position_m.shape == (0, 3)
+    assert camera(tracks).image_px.shape == (0, 2)
+
+
 def test_the_states_have_the_names_that_these_tests_count_on() -> None:
     assert TRACK_STATES == ("visible", "glass", "occluded", "outside", "behind")
 
