@@ -65,11 +65,8 @@ def make_tiles(
                     if name in ways.seen:
                         draw_tracks(image, ways.seen[name], unit)
                     yield Tile(caption, image)
-                elif channel in capture.LAYERS:
-                    for number, image in enumerate(layer_images(reading, channel)):
-                        yield Tile(f"{name} {channel.value} {number}", image)
                 else:
-                    yield Tile(caption, channel_image(reading, channel))
+                    yield from _channel_tiles(caption, reading, channel)
         for name, cloud in sorted(sample.capture.clouds.items()):
             if cloud.lidar.model == pseudo_lidar.MODEL:
                 # The depth image of its camera says the same.
@@ -82,6 +79,16 @@ def make_tiles(
                 yield Tile(name, draw(table, sample.scene, aspect))
         if sample.frame is not None and sample.frame.occupancy is not None:
             yield Tile("occupancy", oblique_view(sample.frame.occupancy, sample.scene))
+
+
+def _channel_tiles(
+    caption: str, reading: capture.SensorReading, channel: capture.Channel
+) -> Iterator[Tile]:
+    if channel not in capture.LAYERS:
+        yield Tile(caption, channel_image(reading, channel))
+        return
+    for number, image in enumerate(layer_images(reading, channel)):
+        yield Tile(f"{reading.sensor} {channel.value} {number}", image)
 
 
 @dataclass
