@@ -184,6 +184,11 @@ class CameraReading:
         return self._reading.time_s
 
     @property
+    def faults(self) -> Mapping[str, Any]:
+        """True faults in the photograph, as plain data; empty without any."""
+        return self._reading.faults
+
+    @property
     def ev100(self) -> float | None:
         """Exposure value at ISO 100, set or metered; None without a colour image."""
         return self._reading.ev100

@@ -188,6 +188,7 @@ class SensorReading:
             image's middle row (see ``camera.shutter``).
         ev100: Exposure value that was set or metered; None without a photograph.
         signal: Of the photograph; None without one, or unless SIGNAL was requested.
+        faults: Faults in the photograph, as plain data; see ``sensors.fault_draws``.
     """
 
     sensor: str
@@ -197,6 +198,7 @@ class SensorReading:
     time_s: float = 0.0
     ev100: float | None = None
     signal: ExpectedSignal | None = None
+    faults: Mapping[str, Any] = field(default_factory=dict)
 
 
 POINT = np.dtype(
@@ -234,12 +236,14 @@ class PointCloud:
     Attributes:
         points: Records of ``POINT`` [n].
         time_s: The instant that ``lidar`` and the boxes refer to: the middle of the sweep.
+        faults: Faults of the scan, as plain data; see ``sensors.fault_draws``.
     """
 
     sensor: str
     lidar: Lidar
     points: NDArray[np.void]
     time_s: float = 0.0
+    faults: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def start_s(self) -> float:
@@ -254,12 +258,14 @@ class Measurements:
     Attributes:
         rows: Records [n] of ``columns_dtype(SensorInfo.columns)``; may be empty.
         time_s: The instant that ``device`` refers to.
+        faults: Faults in the rows, as plain data; see ``sensors.fault_draws``.
     """
 
     sensor: str
     device: Device
     rows: NDArray[np.void]
     time_s: float = 0.0
+    faults: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

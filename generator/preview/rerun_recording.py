@@ -15,9 +15,18 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gen_data.core import asset_types, errors, interfaces, intrinsics, se3, skeletons, whole_files
+from gen_data.core import (
+    asset_types,
+    errors,
+    interfaces,
+    intrinsics,
+    se3,
+    serialization,
+    skeletons,
+    whole_files,
+)
 from gen_data.core.boxes import OrientedBox
-from gen_data.core.capture import LAYERS, Channel, PointCloud, SensorReading
+from gen_data.core.capture import LAYERS, Capture, Channel, PointCloud, SensorReading
 from gen_data.core.sample import TRACK_STATES, ImageTruth, Occupancy, Sample, SensorTracks
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.preview import overlay, palette, sensor_views, voxel_view
@@ -124,6 +133,15 @@ class Recorder:
         for name, cloud in sorted(sample.capture.clouds.items()):
             self._set_time(sample, cloud.time_s)
             self._record_cloud(name, cloud)
+        self._record_faults(sample.capture)
+
+    def _record_faults(self, capture: Capture) -> None:
+        """Log the true faults of all readings that have some, as text."""
+        readings = {**capture.readings, **capture.clouds, **capture.tables}
+        for name, reading in sorted(readings.items()):
+            if reading.faults:
+                text = serialization.canonical_json(reading.faults)
+                self.stream.log(f"faults/{name}", rr.TextDocument(text))
 
     def _set_time(self, sample: Sample, time_s: float) -> None:
         """Set the time of the following logs to an instant of the sample's sequence."""

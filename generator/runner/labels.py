@@ -13,33 +13,37 @@ from typing import Any
 
 from gen_data.core import path_names, scene
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
-from gen_data.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.core.serialization import SPARSE, canonical_json, from_plain, to_plain
 
 LABELS_NAME = "labels.jsonl"
+_SPARSE = {SPARSE: True}
 
 
 @dataclass(frozen=True, slots=True)
 class ImageInfo:
-    """Instant and exposure of an image; see ``SensorReading``."""
+    """Instant, exposure and faults of an image; see ``SensorReading``."""
 
     time_s: float
     ev100: float | None = None
+    faults: Mapping[str, Any] = field(default_factory=dict, metadata=_SPARSE)
 
 
 @dataclass(frozen=True, slots=True)
 class ScanInfo:
-    """Instant and pose of a laser scan; see ``PointCloud``."""
+    """Instant, pose and faults of a laser scan; see ``PointCloud``."""
 
     lidar: scene.Lidar
     time_s: float
+    faults: Mapping[str, Any] = field(default_factory=dict, metadata=_SPARSE)
 
 
 @dataclass(frozen=True, slots=True)
 class TableInfo:
-    """Instant and pose of a device's measurements; see ``Measurements``."""
+    """Instant, pose and faults of a device's measurements; see ``Measurements``."""
 
     device: scene.Device
     time_s: float
+    faults: Mapping[str, Any] = field(default_factory=dict, metadata=_SPARSE)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,9 +83,13 @@ def labels_line(sample: Sample) -> str:
             "instances": [i for number, i in instances.items() if number in shown],
             "truth": {name: _plain_image(t, instances) for name, t in sample.truth.items()},
             "frame": sample.frame,
-            "images": {n: ImageInfo(r.time_s, r.ev100) for n, r in capture.readings.items()},
-            "scans": {n: ScanInfo(c.lidar, c.time_s) for n, c in capture.clouds.items()},
-            "tables": {n: TableInfo(t.device, t.time_s) for n, t in capture.tables.items()},
+            "images": {
+                n: ImageInfo(r.time_s, r.ev100, r.faults) for n, r in capture.readings.items()
+            },
+            "scans": {n: ScanInfo(c.lidar, c.time_s, c.faults) for n, c in capture.clouds.items()},
+            "tables": {
+                n: TableInfo(t.device, t.time_s, t.faults) for n, t in capture.tables.items()
+            },
         }
     )
 

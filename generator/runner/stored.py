@@ -308,6 +308,7 @@ def read_capture(
             ImageFiles(info, folder, labels.truth[name].camera, index, read),
             time_s=image.time_s,
             ev100=image.ev100,
+            faults=image.faults,
         )
         for name, image in labels.images.items()
     }
@@ -315,20 +316,20 @@ def read_capture(
     def cloud(name: str) -> PointCloud:
         scan = labels.scans[name]
         if not has_points:
-            return PointCloud(name, scan.lidar, np.zeros(0, POINT), scan.time_s)
+            return PointCloud(name, scan.lidar, np.zeros(0, POINT), scan.time_s, scan.faults)
         path = cloud_path(folder, name, index)
         points = _load(path, POINT, read)
         if not np.isfinite(points["position_m"]).all():
             raise StorageError(
                 f"{path}: holds a position that is no finite number; generate the data set again"
             )
-        return PointCloud(name, scan.lidar, points, scan.time_s)
+        return PointCloud(name, scan.lidar, points, scan.time_s, scan.faults)
 
     def table(name: str) -> Measurements:
         kept = labels.tables[name]
         dtype = measurement_dtypes.columns_dtype(info.sensor(name).columns)
         rows = _load(table_path(folder, name, index), dtype, read)
-        return Measurements(name, kept.device, rows, kept.time_s)
+        return Measurements(name, kept.device, rows, kept.time_s, kept.faults)
 
     return Capture(readings, ReadOnAccess(labels.scans, cloud), ReadOnAccess(labels.tables, table))
 

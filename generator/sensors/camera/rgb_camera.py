@@ -23,6 +23,7 @@ from gen_data.core.scene import Camera, Region, Scene
 from gen_data.core.shutter import INSTANT, Shutter
 from gen_data.core.stereo import baseline_m, disparity_px, is_seen_by_both
 from gen_data.sensors.camera import lens_models
+from gen_data.sensors.camera.camera_faults import CameraFaults
 from gen_data.sensors.camera.exposure import ExposureTime, RollingShutter, make_shutter
 from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 from gen_data.sensors.camera.rgb_encoding import RgbEncoding
@@ -77,6 +78,7 @@ class RgbCamera(Mounted):
             to its right that forms a rectified pair with it.
         settings_of: Name of the camera whose drawn settings of the image pipeline it shares, as
             the cameras of one rig do; each meters its own image. Empty = settings of its own.
+        faults: Dead pixels and lines, dirt, overexposed pictures; null = none.
     """
 
     type: Literal["rgb_camera"] = "rgb_camera"
@@ -96,6 +98,7 @@ class RgbCamera(Mounted):
     rgb_encoding: RgbEncoding = RgbEncoding()
     stereo_with: str = ""
     settings_of: str = ""
+    faults: CameraFaults | None = None
 
     @model_validator(mode="after")
     def _has_a_partner(self) -> "RgbCamera":
@@ -178,9 +181,12 @@ class RgbCamera(Mounted):
         seen = (requested - PAIRED) | {Channel.Z_DEPTH} if paired else requested
         camera = scene.camera(self.name)
         settings_rng = self._settings_rng(scene, rng)
-        reading = capture_photograph(
-            scene, renderer, camera, seen, self.image_pipeline, rng, settings_rng
-        )
+        faults, lens, pipeline = None, renderer, self.image_pipeline
+        if self.faults is not None:
+            faults = self.faults.draw(camera, rng)
+            lens, pipeline = faults.behind_window(renderer), faults.exposed(pipeline)
+        reading = capture_photograph(scene, lens, camera, seen, pipeline, rng, settings_rng)
+        reading = reading if faults is None else faults.spoil(reading)
         return self._add_disparity(scene, renderer, reading) if paired else reading
 
     def _settings_rng(self, scene: Scene, rng: streams.Rng) -> streams.Rng:

@@ -15,6 +15,7 @@ from gen_data.core.scene import Lidar, Scene, Weather
 from gen_data.core.streams import Rng
 from gen_data.sensors import device_presets, mounting
 from gen_data.sensors.lidar import lidar_atmosphere, lidar_detection, scan_pattern
+from gen_data.sensors.lidar.lidar_faults import LidarFaults
 
 SUBRAYS = 7
 """Rays that sample a beam with divergence."""
@@ -59,6 +60,7 @@ class LidarSensor(mounting.Mounted):
             the lidar frame of each pulse's own instant. ``deskewed``: in that of the sweep's
             middle, as in KITTI's files; moving objects are where each pulse hit them. ``none``:
             all pulses leave in the middle of the sweep.
+        faults: Dead beams and blocked parts of the window; null = none.
     """
 
     type: Literal["lidar"] = "lidar"
@@ -72,6 +74,7 @@ class LidarSensor(mounting.Mounted):
     window: float = Field(1.0, gt=0, le=1)
     ideal: bool = False
     motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
+    faults: LidarFaults | None = None
 
     @field_validator("model")
     @classmethod
@@ -154,7 +157,10 @@ class LidarSensor(mounting.Mounted):
             returns = _add_range_noise(returns, model, weather, rng)
         frames = still if self.motion_distortion == "raw" else shots
         points = _make_points(returns, intensity, frames, sweep)
-        return PointCloud(self.name, lidar, points, scene.time_s)
+        cloud = PointCloud(self.name, lidar, points, scene.time_s)
+        if self.faults is None:
+            return cloud
+        return self.faults.apply(cloud, int(sweep.ring.max()) + 1, rng)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -42,6 +42,7 @@ from gen_data.sensors.mounting import (
     reading_times,
     remove_carrier,
 )
+from gen_data.sensors.navigation.navigation_faults import GnssFaults
 
 COLUMNS = (
     TIME,
@@ -107,6 +108,7 @@ class Gnss(Instrument):
         satellites: Number of satellites above the mask; their directions are drawn per sequence.
         mask_deg: Elevation mask: satellites lower than this are not used.
         noise: Factor on the model's errors; 0 = an ideal device.
+        faults: Jumps of the position; null = none.
     """
 
     kind: ClassVar[str] = "gnss"
@@ -119,6 +121,7 @@ class Gnss(Instrument):
     satellites: int = Field(12, ge=4, le=60)
     mask_deg: float = Field(10.0, ge=0, le=60)
     noise: float = Field(1.0, ge=0)
+    faults: GnssFaults | None = None
 
     def capture(
         self, scene: Scene, renderer: interfaces.Renderer, channels: frozenset[Channel], rng: Rng
@@ -138,7 +141,8 @@ class Gnss(Instrument):
         slow = _draw_slow_errors(times_s, rate_hz, model.correlation_s, shared)
         columns = self._columns(model, motion, times_s, fixes, slow, rng)
         rows = table_rows(COLUMNS, len(times_s), time_s=times_s, **columns)
-        return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
+        fixed = Measurements(self.name, scene.device(self.name), rows, scene.time_s)
+        return fixed if self.faults is None else self.faults.apply(fixed, rng)
 
     def _columns(
         self,

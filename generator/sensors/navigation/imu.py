@@ -34,6 +34,7 @@ from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
 from gen_data.sensors.device_presets import check_preset, load_preset
 from gen_data.sensors.mounting import Instrument, mount_motion, reading_times
+from gen_data.sensors.navigation.navigation_faults import ImuFaults
 
 COLUMNS = (
     TIME,
@@ -79,6 +80,7 @@ class Imu(Instrument):
         model: ``RT3003``, ``ADIS16448`` or ``BMI088``; a file of
             ``generator/sensors/navigation/imu_presets``.
         noise: Factor on the model's errors; 0 = an ideal device.
+        faults: Steps of the biases; null = none.
     """
 
     kind: ClassVar[str] = "imu"
@@ -88,6 +90,7 @@ class Imu(Instrument):
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "RT3003"
     rate_hz: float | None = Field(100.0, gt=0, le=10_000)
     noise: float = Field(1.0, ge=0)
+    faults: ImuFaults | None = None
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
@@ -104,7 +107,8 @@ class Imu(Instrument):
             readings = np.clip(readings, -limits, limits)
         columns = dict(zip(AXES, np.round(readings, 9).T, strict=True))
         rows = table_rows(COLUMNS, len(times_s), time_s=times_s, **columns)
-        return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
+        read = Measurements(self.name, scene.device(self.name), rows, scene.time_s)
+        return read if self.faults is None else self.faults.apply(read, AXES, rng)
 
 
 def _true_readings(scene: Scene, name: str, times_s: Array) -> Array:
