@@ -316,6 +316,8 @@ def _share_faults(item: ObjectTruth) -> Iterator[Fault]:
         # Written so that NaN is a fault.
         if share is not None and not 0.0 <= share <= 1.0:
             yield name, f"{share} is not in [0, 1]"
+    if item.detectability is not None and not 0.0 <= item.detectability < math.inf:
+        yield "detectability", f"{item.detectability} is no number from 0"
     if item.visible_fraction is not None and (item.visible_fraction > 0) != (item.visible_px > 0):
         yield "visible_fraction", f"{item.visible_fraction} with {item.visible_px} visible pixels"
     for name, count in (item.part_px or {}).items():

@@ -53,6 +53,7 @@ class Channel(str, Enum):
     CATEGORY              uint16 [h, w]           category id; 0
     OBJECT_COORDINATES    float32 [h, w, 3]       position in the instance's box, [0, 1]; 0
     AMODAL                (silhouettes)           each instance alone, also outside the image
+    SIGNAL                (expected signal)       a photograph before its noise; none without RGB
     MEASURED_DEPTH        float32 [h, w]          depth as a device reports it [m]; inf
     INFRARED              uint16 [h, w]           its image of its own light, in its own units; 0
     DISPARITY             float32 [h, w]          to the camera on the right [px]; 0
@@ -97,6 +98,7 @@ class Channel(str, Enum):
     CATEGORY = "category"
     OBJECT_COORDINATES = "object_coordinates"
     AMODAL = "amodal"
+    SIGNAL = "signal"
     MEASURED_DEPTH = "measured_depth"
     INFRARED = "infrared"
     DISPARITY = "disparity"
@@ -115,6 +117,11 @@ class Channel(str, Enum):
     def __str__(self) -> str:
         """The name in YAML and of folders."""
         return self.value
+
+    @property
+    def is_image(self) -> bool:
+        """Whether it is one of ``SensorReading.channels``."""
+        return self not in (Channel.AMODAL, Channel.SIGNAL)
 
 
 LAYERS: Mapping[Channel, float] = {
@@ -155,6 +162,22 @@ class Silhouette:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class ExpectedSignal:
+    """What a photograph would be without noise, as its sensor reads it, and its noise.
+
+    Both are shares of saturation, float32 [h, w, c]: one value of a pixel behind a colour filter
+    (the pattern repeats after two pixels) or on a monochrome sensor, three of others.
+
+    Attributes:
+        mean: Of repeated photographs.
+        stddev: Of one photograph about the mean, the sensor's fixed pattern included.
+    """
+
+    mean: NDArray[np.float32]
+    stddev: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class SensorReading:
     """Reading of one camera.
 
@@ -164,6 +187,7 @@ class SensorReading:
         time_s: The instant that depth, ids and boxes refer to; with a rolling shutter, that of the
             image's middle row (see ``camera.shutter``).
         ev100: Exposure value that was set or metered; None without a photograph.
+        signal: Of the photograph; None without one, or unless SIGNAL was requested.
     """
 
     sensor: str
@@ -172,6 +196,7 @@ class SensorReading:
     silhouettes: Mapping[int, Silhouette] = field(default_factory=dict)
     time_s: float = 0.0
     ev100: float | None = None
+    signal: ExpectedSignal | None = None
 
 
 POINT = np.dtype(

@@ -237,10 +237,16 @@ def _outline(image: Image, item: sample.ObjectTruth, width: int) -> None:
     window[edge] = id_color(item.instance.instance_id)
 
 
+def title(item: sample.ObjectTruth) -> str:
+    """The category of an object, with its d' where that is annotated."""
+    index = "" if item.detectability is None else f" d'={item.detectability:.0f}"
+    return f"{item.instance.category}{index}"
+
+
 def _write(image: Image, item: sample.ObjectTruth, unit: float, places: list[boxes.BoxPx]) -> None:
     """Write the category of an object above its box, below the names at the same place."""
     assert item.box is not None
-    text, size, pen = item.instance.category, FONT_SIZE * unit, max(1, round(unit))
+    text, size, pen = title(item), FONT_SIZE * unit, max(1, round(unit))
     (width, height), base = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, pen)
     pad = max(1, round(2 * unit))
     width, height = width + 2 * pad, height + base // 2 + 2 * pad

@@ -372,7 +372,7 @@ def boxes_2d(truth: ImageTruth) -> rr.Boxes2D:
     return rr.Boxes2D(
         mins=[(item.box.x_min, item.box.y_min) for item in items if item.box],
         sizes=[(item.box.width_px, item.box.height_px) for item in items if item.box],
-        labels=[item.instance.category for item in items],
+        labels=[overlay.title(item) for item in items],
         class_ids=[item.instance.category_id for item in items],
     )
 
