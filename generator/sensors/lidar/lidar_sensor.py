@@ -14,7 +14,12 @@ from gen_data.core.capture import POINT, Channel, LidarHits, LidarRays, PointClo
 from gen_data.core.scene import Lidar, Scene, Weather
 from gen_data.core.streams import Rng
 from gen_data.sensors import device_presets, mounting
-from gen_data.sensors.lidar import lidar_atmosphere, lidar_detection, scan_pattern
+from gen_data.sensors.lidar import (
+    lidar_atmosphere,
+    lidar_detection,
+    point_origins,
+    scan_pattern,
+)
 
 SUBRAYS = 7
 """Rays that sample a beam with divergence."""
@@ -59,6 +64,8 @@ class LidarSensor(mounting.Mounted):
             the lidar frame of each pulse's own instant. ``deskewed``: in that of the sweep's
             middle, as in KITTI's files; moving objects are where each pulse hit them. ``none``:
             all pulses leave in the middle of the sweep.
+        origins: Whether to write what each point comes from: its path (direct, through glass, by a
+            mirror), and the true instance and position.
     """
 
     type: Literal["lidar"] = "lidar"
@@ -72,6 +79,7 @@ class LidarSensor(mounting.Mounted):
     window: float = Field(1.0, gt=0, le=1)
     ideal: bool = False
     motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
+    origins: bool = False
 
     @field_validator("model")
     @classmethod
@@ -99,7 +107,7 @@ class LidarSensor(mounting.Mounted):
 
     def describe(self) -> interfaces.SensorInfo:
         """Describe a laser scanner."""
-        return self._info(self.name, interfaces.Modality.LIDAR)
+        return self._info(self.name, interfaces.Modality.LIDAR, origins=self.origins)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this scanner to its rig, or to its camera.
@@ -109,7 +117,14 @@ class LidarSensor(mounting.Mounted):
         """
         name = self.model if isinstance(self.model, str) else self.model.name
         sweep_s = round(1.0 / self.device.rotation_hz, 9)
-        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
+        lidar = Lidar(
+            self.name,
+            self.camera,
+            self.T_rig_sensor,
+            model=name,
+            sweep_s=sweep_s,
+            origins=self.origins,
+        )
         return mounting.add_lidar(scene, self, lidar)
 
     def capture(
@@ -131,9 +146,12 @@ class LidarSensor(mounting.Mounted):
             shots.origins_m,
             shots.time_s,
             sweep.order,
+            self.origins,
         )
         hits = renderer.scan(scene, lidar, beams)
         hits = _without_mirrored(hits) if self.ideal else hits
+        if self.origins:
+            hits = point_origins.number_detours(hits)
         pulses = lidar_detection.make_pulses(hits, model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
@@ -145,6 +163,12 @@ class LidarSensor(mounting.Mounted):
         returns = Returns.select(
             pulses, *lidar_detection.select_returns(pulses, detected, self.returns)
         )
+        origins = None
+        if self.origins:
+            ids, detour = point_origins.split_numbers(returns.instance_id)
+            returns = replace(returns, instance_id=ids)
+            straight_m = shots.points_m(returns.row, returns.range_m)
+            origins = point_origins.make_origins(ids, detour, straight_m, hits.detours, lidar)
         if self.ideal:
             intensity = lidar_detection.report_intensity(returns.reflectance, model)
         else:
@@ -154,7 +178,7 @@ class LidarSensor(mounting.Mounted):
             returns = _add_range_noise(returns, model, weather, rng)
         frames = still if self.motion_distortion == "raw" else shots
         points = _make_points(returns, intensity, frames, sweep)
-        return PointCloud(self.name, lidar, points, scene.time_s)
+        return PointCloud(self.name, lidar, points, scene.time_s, origins)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -184,7 +208,8 @@ def _without_mirrored(hits: LidarHits) -> LidarHits:
     if hits.detours is None:
         return hits
     real = hits.detours.surface != asset_types.SURFACES.index("mirrored")
-    kept = (getattr(hits.detours, field.name)[real] for field in fields(SecondaryHits))
+    values = (getattr(hits.detours, field.name) for field in fields(SecondaryHits))
+    kept = (None if value is None else value[real] for value in values)
     return replace(hits, detours=SecondaryHits(*kept) if real.any() else None)
 
 
