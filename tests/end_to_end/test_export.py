@@ -62,7 +62,7 @@ def test_origins_of_points_are_stored_and_linked(tmp_path: Path) -> None:
     """As long as the scan, in the data set, in its export, and in the files of exporters."""
     (tmp_path / "scanned.yaml").write_text(SCANNED)
     package.generate(tmp_path / "scanned.yaml", n=1, out=tmp_path / "made", workers=0)
-    package.export(tmp_path / "made", ["{type: webdataset}"], tmp_path / "out", workers=0)
+    package.export(tmp_path / "made", ["webdataset"], tmp_path / "out", workers=0)
 
     for folder in (tmp_path / "made", tmp_path / "out"):
         (sample,) = package.open(folder)

@@ -208,9 +208,9 @@ def _without_mirrored(hits: LidarHits) -> LidarHits:
     if hits.detours is None:
         return hits
     real = hits.detours.surface != asset_types.SURFACES.index("mirrored")
-    values = (getattr(hits.detours, field.name) for field in fields(SecondaryHits))
-    kept = (None if value is None else value[real] for value in values)
-    return replace(hits, detours=SecondaryHits(*kept) if real.any() else None)
+    values = {field.name: getattr(hits.detours, field.name) for field in fields(SecondaryHits)}
+    kept: dict[str, Any] = {name: v[real] for name, v in values.items() if v is not None}
+    return replace(hits, detours=replace(hits.detours, **kept) if real.any() else None)
 
 
 def _apply_weather(
