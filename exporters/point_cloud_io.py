@@ -18,11 +18,15 @@ PointTime = Literal["sweep_middle", "sweep_start"]
 
 
 def write_cloud(cloud: capture.PointCloud, shard_dir: Path, index: int) -> None:
-    """Write one sweep to its ``cloud_path``."""
+    """Write one sweep to its ``cloud_path``, and its origins to their ``origins_path``."""
     path = interfaces.cloud_path(shard_dir, cloud.sensor, index)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("wb") as file:
-        np.lib.format.write_array(file, cloud.points, version=(1, 0), allow_pickle=False)
+    arrays = {path: cloud.points}
+    if cloud.origins is not None:
+        arrays[interfaces.origins_path(shard_dir, cloud.sensor, index)] = cloud.origins
+    for path, records in arrays.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("wb") as file:
+            np.lib.format.write_array(file, records, version=(1, 0), allow_pickle=False)
 
 
 def scanner_at_sweep(sample: Sample, lidar: str) -> scene.Lidar:

@@ -37,7 +37,7 @@ from numpy.lib.recfunctions import structured_to_unstructured
 from pydantic import Field
 
 from gen_data.core import errors, serialization
-from gen_data.core.interfaces import DatasetInfo, cloud_path, table_path
+from gen_data.core.interfaces import DatasetInfo, cloud_path, origins_path, table_path
 from gen_data.core.sample import Sample
 from gen_data.exporters import base, coco, fragments, point_cloud_io, sensor_selection, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
@@ -144,6 +144,8 @@ def _fields(
     for lidar in info.lidars:
         if sensor_selection.has_scans(shard_dir, lidar, index):
             paths[f"{lidar}.points.npy"] = cloud_path(shard_dir, lidar, index)
+        if (path := origins_path(shard_dir, lidar, index)).exists():
+            paths[f"{lidar}.origins.npy"] = path
     for device in info.devices:
         path = table_path(shard_dir, device, index)
         if path.exists():

@@ -14,7 +14,7 @@ from gen_data.annotations.instance_extents import crop
 from gen_data.core import errors, motion, se3
 from gen_data.core.asset_types import LAYER_MATERIALS
 from gen_data.core.boxes import BoxPx, OrientedBox, tight_box
-from gen_data.core.capture import LAYERS, Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.capture import LAYERS, PATHS, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import EgoTruth, ImageTruth, MaskPx, ObjectTruth, Relation, Sample
 from gen_data.core.scene import Instance, Scene
@@ -387,8 +387,23 @@ def _cloud_faults(
         yield f"{name}.instance_id", f"{foreign[0]} is not in the scene"
     if int(points["category_id"].max()) > len(info.categories):
         yield f"{name}.category_id", f"{points['category_id'].max()} of {len(info.categories)}"
+    yield from _origin_faults(name, cloud, ids)
     if (points["return_number"] > points["return_count"]).any():
         yield f"{name}.return_number", "exceeds the number of returns"
+
+
+def _origin_faults(name: str, cloud: PointCloud, ids: set[int]) -> Iterator[Fault]:
+    origins = cloud.origins
+    if origins is None:
+        return
+    if len(origins) != len(cloud.points):
+        yield f"{name}.origins", f"are {len(origins)} of {len(cloud.points)} points"
+    if not np.isfinite(origins["true_position_m"]).all():
+        yield f"{name}.true_position_m", "has a NaN or an infinite value"
+    if not np.isin(origins["true_instance_id"], [0, *ids]).all():
+        yield f"{name}.true_instance_id", "has an instance that is not in the scene"
+    if (origins["path"] >= len(PATHS)).any():
+        yield f"{name}.path", f"is {origins['path'].max()} of {len(PATHS) - 1}"
 
 
 def _table_faults(name: str, table: Measurements) -> Iterator[Fault]:

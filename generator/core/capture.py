@@ -229,6 +229,22 @@ return_count              how many returns its pulse has
 """
 
 
+PATHS = ("direct", "glass", "mirror")
+"""How light reaches what a laser scanner reports: straight, through panes of glass, or by way of a
+mirror, a window or a puddle."""
+
+ORIGIN = np.dtype([("path", "u1"), ("true_instance_id", "<u2"), ("true_position_m", "<f4", (3,))])
+"""What a point of a laser scan comes from.
+
+================  ============================================================================
+path              number in ``PATHS``
+true_instance_id  instance that reflected the light, also in a mirror; 0 as in ``POINT``
+true_position_m   where, in the world frame at the pulse's instant [m]: without the error of the
+                  range, and the place of the object itself rather than of its mirror image
+================  ============================================================================
+"""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class PointCloud:
     """Points of one sweep of a laser scanner, in the order of firing.
@@ -236,6 +252,7 @@ class PointCloud:
     Attributes:
         points: Records of ``POINT`` [n].
         time_s: The instant that ``lidar`` and the boxes refer to: the middle of the sweep.
+        origins: Records of ``ORIGIN`` [n] of the points; None unless ``lidar.origins``.
         faults: Faults of the scan, as plain data; see ``sensors.fault_draws``.
     """
 
@@ -243,6 +260,7 @@ class PointCloud:
     lidar: Lidar
     points: NDArray[np.void]
     time_s: float = 0.0
+    origins: NDArray[np.void] | None = None
     faults: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -282,6 +300,7 @@ class LidarRays:
             trajectories are hit where they are then. None = all 0.
         order: Permutation of the beams, int32 [n], that makes neighbours nearly parallel, which
             speeds up tracing; None = they already are.
+        mirrored: Whether secondary hits state what mirrors show.
     """
 
     directions: NDArray[np.float32]
@@ -291,6 +310,7 @@ class LidarRays:
     origins_m: NDArray[np.float32] | None = None
     time_s: NDArray[np.float32] | None = None
     order: NDArray[np.int32] | None = None
+    mirrored: bool = False
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -303,6 +323,9 @@ class SecondaryHits:
             losses in glass or mirror.
         instance_id, category_id, surface: As in LidarHits. Mirrored objects have no ids, as they
             are not at the position of the point.
+        mirrored_id: Instance that a mirror shows, uint16; 0 elsewhere. None unless requested.
+        mirrored_m: Where it is, within 2 mm, lidar frame, float32 [m, 3]; NaN elsewhere. None
+            unless requested.
     """
 
     ray: NDArray[np.int64]
@@ -311,6 +334,8 @@ class SecondaryHits:
     instance_id: NDArray[np.uint16]
     category_id: NDArray[np.uint16]
     surface: NDArray[np.uint8]
+    mirrored_id: NDArray[np.uint16] | None = None
+    mirrored_m: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -375,6 +375,7 @@ class SensorInfo:
             once per step.
         time_offset_s: Delay of readings after the step's instant [s].
         rgb_encoding: Cameras: encoding of the files of the rgb channel; others are PNG.
+        origins: Laser scanners: whether scans have ``capture.ORIGIN`` records.
         needs_clear_view: Whether a position inside the body that carries it is refused.
     """
 
@@ -389,6 +390,7 @@ class SensorInfo:
     time_offset_s: float = 0.0
     needs_clear_view: bool = False
     rgb_encoding: ImageEncoding = PNG
+    origins: bool = False
 
 
 class Sensor(Protocol):
@@ -733,6 +735,23 @@ def media_path(shard_dir: Path, sensor: str, channel: Channel, index: int) -> Pa
 def cloud_path(shard_dir: Path, sensor: str, index: int) -> Path:
     """Path of the points of one sweep: a NumPy file with an array of ``POINT`` records."""
     return shard_dir / f"{sensor}/points/{index:09d}.npy"
+
+
+def origins_path(shard_dir: Path, sensor: str, index: int) -> Path:
+    """Path of the origins of the points of one sweep: an array of ``ORIGIN`` records."""
+    return shard_dir / f"{sensor}/origins/{index:09d}.npy"
+
+
+def reading_paths(shard_dir: Path, capture: Capture, index: int) -> dict[str, tuple[Path, ...]]:
+    """Paths of the files of laser scanners and devices with a reading, by sensor."""
+    paths = {
+        name: (
+            cloud_path(shard_dir, name, index),
+            *([origins_path(shard_dir, name, index)] if cloud.lidar.origins else []),
+        )
+        for name, cloud in capture.clouds.items()
+    }
+    return {**paths, **{n: (table_path(shard_dir, n, index),) for n in capture.tables}}
 
 
 def table_path(shard_dir: Path, sensor: str, index: int) -> Path:

@@ -602,6 +602,7 @@ class Lidar:
         model: Name of the device in labels, such as ``HDL-64E``.
         rig: Name of its rig; empty = it is mounted at ``camera``.
         sweep_s: Duration of a sweep; the scene's instant is its middle.
+        origins: Whether its scans have ``capture.ORIGIN`` records.
     """
 
     name: str
@@ -611,6 +612,7 @@ class Lidar:
     model: str = ""
     rig: str = ""
     sweep_s: float = 0.0
+    origins: bool = field(default=False, metadata={serialization.SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)

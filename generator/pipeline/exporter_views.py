@@ -20,8 +20,7 @@ from gen_data.core.interfaces import (
     DatasetInfo,
     Exporter,
     Modality,
-    cloud_path,
-    table_path,
+    reading_paths,
 )
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Camera, Device, Lidar, Scene
@@ -248,9 +247,9 @@ class ExporterView:
                         target.write_bytes(data)
                 else:
                     pairs.append((source, target))
-        for path_of, names in ((cloud_path, capture.clouds), (table_path, capture.tables)):
-            chosen = {sensor.name for sensor in seen.sensors} & set(names)
-            pairs += [(path_of(shard_dir, n, index), path_of(folder, n, index)) for n in chosen]
+        sources, targets = (reading_paths(d, capture, index) for d in (shard_dir, folder))
+        for name in {sensor.name for sensor in seen.sensors} & sources.keys():
+            pairs += zip(sources[name], targets[name], strict=True)
         for source, target in pairs:
             if not target.exists():
                 link_or_copy(source, target)

@@ -225,6 +225,8 @@ def _outputs(info: DatasetInfo, sensor: SensorInfo) -> Iterator[tuple[str, str]]
         yield channel.value, _meaning(info, channel.value)
     if sensor.modality is Modality.LIDAR:
         yield "points", _meaning(info, "lidar")
+        if sensor.origins:
+            yield "origins", _meaning(info, "origins")
     if sensor.modality is Modality.DEVICE:
         columns = ", ".join(column.name for column in sensor.columns)
         yield "rows", f"{_meaning(info, 'device')}: {columns}"

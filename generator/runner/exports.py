@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.core.interfaces import DatasetInfo, Exporter, cloud_path, table_path
+from gen_data.core.interfaces import DatasetInfo, Exporter, reading_paths
 from gen_data.core.sample import Sample
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.runner import durable_files, labels, layout, plan, seal, shard_record, verify
@@ -95,8 +95,9 @@ class LinkedFiles:
             for name in capture.readings
             for c in info.media[name]
         ]
-        for names, path_of in ((capture.clouds, cloud_path), (capture.tables, table_path)):
-            pairs += [(path_of(source_dir, n, index), path_of(shard_dir, n, index)) for n in names]
+        sources, targets = (reading_paths(d, capture, index) for d in (source_dir, shard_dir))
+        for name in sources:
+            pairs += zip(sources[name], targets[name], strict=True)
         for source, target in pairs:
             link_or_copy(source, target)
 

@@ -241,7 +241,7 @@ def drop_pixels(sample: Sample) -> Sample:
         for name, reading in capture.readings.items()
     }
     clouds = {
-        name: replace(cloud, points=cloud.points[:0].copy())
+        name: replace(cloud, points=cloud.points[:0].copy(), origins=None)
         for name, cloud in capture.clouds.items()
     }
     return replace(sample, capture=Capture(readings, clouds))

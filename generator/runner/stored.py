@@ -18,9 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.core import measurement_dtypes, path_names, serialization, urls
-from gen_data.core.capture import POINT, Capture, Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.capture import (
+    ORIGIN,
+    POINT,
+    Capture,
+    Channel,
+    Measurements,
+    PointCloud,
+    SensorReading,
+)
 from gen_data.core.errors import SampleIndexError, StorageError
-from gen_data.core.interfaces import DatasetInfo, cloud_path, table_path
+from gen_data.core.interfaces import DatasetInfo, cloud_path, origins_path, table_path
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Camera, Scene
 from gen_data.runner import durable_files, failed_sample, layout, plan, store
@@ -323,7 +331,10 @@ def read_capture(
             raise StorageError(
                 f"{path}: holds a position that is no finite number; generate the data set again"
             )
-        return PointCloud(name, scan.lidar, points, scan.time_s, scan.faults)
+        origins = None
+        if scan.lidar.origins:
+            origins = _load(origins_path(folder, name, index), ORIGIN, read)
+        return PointCloud(name, scan.lidar, points, scan.time_s, origins, scan.faults)
 
     def table(name: str) -> Measurements:
         kept = labels.tables[name]

@@ -14,6 +14,7 @@ from gen_data.core.boxes import BoxPx, OrientedBox
 from gen_data.core.capture import (
     LAYERS,
     MIRRORED,
+    ORIGIN,
     POINT,
     Capture,
     Channel,
@@ -154,6 +155,18 @@ def change_pixel(channel: Channel, value: float) -> Mutation:
         image = sample.capture.readings["color"].channels[channel]
         image[rng.randrange(HEIGHT_PX), rng.randrange(WIDTH_PX)] = value
         return sample
+
+    return mutate
+
+
+def change_origins(field: str, value: float) -> Mutation:
+    def mutate(rng: random.Random) -> Sample:
+        sample = make_sample()
+        cloud = sample.capture.clouds["top"]
+        origins = np.zeros(len(cloud.points), ORIGIN)
+        origins[field][rng.randrange(50)] = value
+        clouds = {"top": replace(cloud, origins=origins)}
+        return replace(sample, capture=replace(sample.capture, clouds=clouds))
 
     return mutate
 
@@ -300,6 +313,9 @@ MUTATIONS: dict[str, Mutation] = {
     "material of nothing": change_pixel(Channel.MATERIAL_LAYERS, 99),
     "mirrored instance unknown": change_pixel(Channel.SEEN_IN_MIRROR, 99),
     "mirrored position infinite": change_pixel(Channel.MIRRORED_POSITION, INF),
+    "origin NaN": change_origins("true_position_m", NAN),
+    "origin of nothing": change_origins("true_instance_id", 99),
+    "path unknown": change_origins("path", 3),
     "points NaN": change_points("intensity", NAN),
     "points far": change_points("position_m", INF),
     "points of nothing": change_points("instance_id", 99),

@@ -8,8 +8,9 @@ import pytest
 
 from gen_data.core import errors, se3, streams
 from gen_data.core.asset_types import SURFACES
-from gen_data.core.capture import POINT, LidarHits, LidarRays, PointCloud, SecondaryHits
+from gen_data.core.capture import PATHS, POINT, LidarHits, LidarRays, PointCloud, SecondaryHits
 from gen_data.core.scene import Camera, Lidar, Scene, Weather
+from gen_data.core.serialization import to_plain
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar import lidar_atmosphere, lidar_detection
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
@@ -112,6 +113,68 @@ def test_an_ideal_scan_has_nothing_behind_mirrors(returns: lidar_detection.Kept)
     assert (real["surface"] == SURFACES.index("mirrored")).sum() == 3
     assert (ideal["surface"] != SURFACES.index("mirrored")).all()
     assert ideal["instance_id"][far].tolist() == [9]
+
+
+class ShownMirrors(Mirrors):
+    """As Mirrors; instance 5 is what is seen in them, at (1, 2, 3) of the scanner."""
+
+    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
+        hits = super().scan(scene, lidar, beams)
+        assert beams.mirrored and hits.detours is not None
+        ids, place = np.array([5, 5, 5, 0], np.uint16), np.full((4, 3), (1, 2, 3), np.float32)
+        return replace(hits, detours=replace(hits.detours, mirrored_id=ids, mirrored_m=place))
+
+
+@pytest.mark.parametrize("divergence", [False, True])
+@pytest.mark.parametrize("returns", ["last", "dual"])
+def test_origins_say_how_light_came_and_from_where(
+    returns: lidar_detection.Kept, divergence: bool
+) -> None:
+    """Mirrored points are where the mirrored instance is, others where they are without noise.
+
+    The points themselves are those of a scanner without origins.
+    """
+    plain = LidarSensor(model="VLP-16", divergence=divergence, returns=returns)
+    sensor = plain.model_copy(update={"origins": True})
+    seen = ShownMirrors(30.0, reflectance=0.01 if not divergence else 0.5)
+    scene = scene_with(sensor)
+    pose = se3.SE3.about_z(0.5, (7.0, -3.0, 2.0))
+    lidar = replace(scene.lidars[0], T_world_lidar=pose)
+    cloud = sensor.capture(replace(scene, lidars=(lidar,)), seen, frozenset(), rng())  # type: ignore[arg-type]
+    origins, points = cloud.origins, cloud.points
+    assert origins is not None and len(origins) == len(points)
+    np.testing.assert_array_equal(points, scan(plain, Mirrors(30.0, seen.reflectance)))
+
+    path = np.array(PATHS)[origins["path"]]
+    mirrored = points["surface"] == SURFACES.index("mirrored")
+    assert ((path == "mirror") == mirrored).all()
+    assert ((path == "glass") == (points["instance_id"] == 9)).all()
+    if not divergence:
+        assert (mirrored.sum(), (path == "glass").sum()) == (3, 1)
+    expected = np.where(mirrored, 5, points["instance_id"])
+    np.testing.assert_array_equal(origins["true_instance_id"], expected)
+    shown = np.broadcast_to(pose.apply(np.array([1.0, 2.0, 3.0])), (mirrored.sum(), 3))
+    np.testing.assert_allclose(origins["true_position_m"][mirrored], shown, rtol=1e-6)
+    away = np.linalg.norm(origins["true_position_m"] - pose.translation_m, axis=1)
+    np.testing.assert_allclose(away[path == "direct"], 30.0, rtol=1e-5)
+    np.testing.assert_allclose(away[path == "glass"], 50.0, rtol=1e-5)
+
+
+def test_an_ideal_scan_has_no_mirrored_origins_and_other_scans_have_none_at_all() -> None:
+    sensor = LidarSensor(model="VLP-16", ideal=True, origins=True)
+    cloud = sensor.capture(scene_with(sensor), ShownMirrors(30.0), frozenset(), rng())  # type: ignore[arg-type]
+    assert cloud.origins is not None and set(np.unique(cloud.origins["path"])) <= {0, 1}
+    assert cloud.lidar.origins and "origins" in to_plain(cloud.lidar)
+
+    plain = LidarSensor(model="VLP-16", ideal=True)
+    cloud = plain.capture(scene_with(plain), Mirrors(30.0), frozenset(), rng())  # type: ignore[arg-type]
+    assert cloud.origins is None and "origins" not in to_plain(cloud.lidar)
+
+
+def test_a_renderer_that_does_not_state_what_mirrors_show_is_named() -> None:
+    sensor = LidarSensor(model="VLP-16", origins=True)
+    with pytest.raises(errors.SampleError, match="sensor 'lidar': origins: this renderer does not"):
+        sensor.capture(scene_with(sensor), Mirrors(30.0), frozenset(), rng())  # type: ignore[arg-type]
 
 
 def test_range_noise_is_that_of_the_data_sheet_on_steps_of_the_device() -> None:

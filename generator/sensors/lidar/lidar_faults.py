@@ -54,7 +54,9 @@ class LidarFaults(Strict):
         lost = np.isin(cloud.points["ring"], dead)
         for begin_deg, width_deg in sectors:
             lost |= (azimuth_deg - begin_deg) % 360.0 < width_deg
-        return replace(cloud, points=cloud.points[~lost], faults=_record(dead.tolist(), sectors))
+        origins = None if cloud.origins is None else cloud.origins[~lost]
+        faults = _record(dead.tolist(), sectors)
+        return replace(cloud, points=cloud.points[~lost], origins=origins, faults=faults)
 
 
 def _record(dead: list[int], sectors: list[tuple[float, float]]) -> Mapping[str, Any]:

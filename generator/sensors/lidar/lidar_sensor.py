@@ -14,7 +14,12 @@ from gen_data.core.capture import POINT, Channel, LidarHits, LidarRays, PointClo
 from gen_data.core.scene import Lidar, Scene, Weather
 from gen_data.core.streams import Rng
 from gen_data.sensors import device_presets, mounting
-from gen_data.sensors.lidar import lidar_atmosphere, lidar_detection, scan_pattern
+from gen_data.sensors.lidar import (
+    lidar_atmosphere,
+    lidar_detection,
+    point_origins,
+    scan_pattern,
+)
 from gen_data.sensors.lidar.lidar_faults import LidarFaults
 
 SUBRAYS = 7
@@ -61,6 +66,8 @@ class LidarSensor(mounting.Mounted):
             middle, as in KITTI's files; moving objects are where each pulse hit them. ``none``:
             all pulses leave in the middle of the sweep.
         faults: Dead beams and blocked parts of the window; null = none.
+        origins: Whether to write what each point comes from: its path (direct, through glass, by a
+            mirror), and the true instance and position.
     """
 
     type: Literal["lidar"] = "lidar"
@@ -75,6 +82,7 @@ class LidarSensor(mounting.Mounted):
     ideal: bool = False
     motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
     faults: LidarFaults | None = None
+    origins: bool = False
 
     @field_validator("model")
     @classmethod
@@ -102,7 +110,7 @@ class LidarSensor(mounting.Mounted):
 
     def describe(self) -> interfaces.SensorInfo:
         """Describe a laser scanner."""
-        return self._info(self.name, interfaces.Modality.LIDAR)
+        return self._info(self.name, interfaces.Modality.LIDAR, origins=self.origins)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this scanner to its rig, or to its camera.
@@ -112,7 +120,14 @@ class LidarSensor(mounting.Mounted):
         """
         name = self.model if isinstance(self.model, str) else self.model.name
         sweep_s = round(1.0 / self.device.rotation_hz, 9)
-        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
+        lidar = Lidar(
+            self.name,
+            self.camera,
+            self.T_rig_sensor,
+            model=name,
+            sweep_s=sweep_s,
+            origins=self.origins,
+        )
         return mounting.add_lidar(scene, self, lidar)
 
     def capture(
@@ -134,9 +149,12 @@ class LidarSensor(mounting.Mounted):
             shots.origins_m,
             shots.time_s,
             sweep.order,
+            self.origins,
         )
         hits = renderer.scan(scene, lidar, beams)
         hits = _without_mirrored(hits) if self.ideal else hits
+        if self.origins:
+            hits = point_origins.number_detours(hits)
         pulses = lidar_detection.make_pulses(hits, model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
@@ -148,6 +166,12 @@ class LidarSensor(mounting.Mounted):
         returns = Returns.select(
             pulses, *lidar_detection.select_returns(pulses, detected, self.returns)
         )
+        origins = None
+        if self.origins:
+            ids, detour = point_origins.split_numbers(returns.instance_id)
+            returns = replace(returns, instance_id=ids)
+            straight_m = shots.points_m(returns.row, returns.range_m)
+            origins = point_origins.make_origins(ids, detour, straight_m, hits.detours, lidar)
         if self.ideal:
             intensity = lidar_detection.report_intensity(returns.reflectance, model)
         else:
@@ -157,7 +181,7 @@ class LidarSensor(mounting.Mounted):
             returns = _add_range_noise(returns, model, weather, rng)
         frames = still if self.motion_distortion == "raw" else shots
         points = _make_points(returns, intensity, frames, sweep)
-        cloud = PointCloud(self.name, lidar, points, scene.time_s)
+        cloud = PointCloud(self.name, lidar, points, scene.time_s, origins)
         if self.faults is None:
             return cloud
         return self.faults.apply(cloud, int(sweep.ring.max()) + 1, rng)
@@ -190,8 +214,9 @@ def _without_mirrored(hits: LidarHits) -> LidarHits:
     if hits.detours is None:
         return hits
     real = hits.detours.surface != asset_types.SURFACES.index("mirrored")
-    kept = (getattr(hits.detours, field.name)[real] for field in fields(SecondaryHits))
-    return replace(hits, detours=SecondaryHits(*kept) if real.any() else None)
+    values = {field.name: getattr(hits.detours, field.name) for field in fields(SecondaryHits)}
+    kept: dict[str, Any] = {name: v[real] for name, v in values.items() if v is not None}
+    return replace(hits, detours=replace(hits.detours, **kept) if real.any() else None)
 
 
 def _apply_weather(

@@ -183,16 +183,17 @@ class FirstHits:
 def trace_secondary(
     inputs: Sequence[Any],
     first: FirstHits,
-    order: NDArray[np.int32] | None,
+    beams: LidarRays,
     infrared: NDArray[np.void],
     labels: HitLabels,
     cache: DeviceCache,
 ) -> SecondaryHits | None:
     """Secondary hits of all rays; None without any.
 
-    ``inputs`` are those of the kernel that found the first hits, ``order`` the order of the beams,
-    ``infrared`` the Infrared records of the materials.
+    ``inputs`` are those of the kernel that found the first hits, ``infrared`` the Infrared records
+    of the materials.
     """
+    order = beams.order
     material = first.hits[:, 1]
     clear = np.append(infrared["clear"] > 0.0, False)[material]
     mirror = np.append(infrared["mirror"] > 0.0, False)[material]
@@ -203,6 +204,7 @@ def trace_secondary(
     if not len(selected):
         return None
     found = Readback.allocate(len(selected), _SECONDARY, cache.device)
+    places = wp.zeros(len(mirrors) if beams.mirrored else 0, dtype=wp.vec3, device=cache.device)
     threads = inputs[0].threads
     if len(panes):
         given = [wp.array(panes, dtype=int, device=cache.device), first.ranges_m]
@@ -220,17 +222,30 @@ def trace_secondary(
             wp.array(water, dtype=float, device=cache.device),
         ]
         outputs = [part[len(panes) :] for part in found.parts]
+        outputs.append(places)
         launch(kernels.trace_mirrors, threads, [*inputs, *given], outputs, device=cache.device)
     ranges_m, reflectances, hits = found.numpy()
     there = hits[:, 0] >= 0
     instances, categories, surfaces = labels.at(hits[there])
     mirrored = there[: len(panes)].sum()
+    ids, shown_m = None, None
+    if beams.mirrored:
+        ids, shown_m = _mirrored(instances, mirrored, places.numpy()[there[len(panes) :]])
     instances[mirrored:], categories[mirrored:] = 0, 0
     surfaces[mirrored:] = asset_types.SURFACES.index("mirrored")
     rays = selected[there].astype(np.int64)
     return SecondaryHits(
-        rays, ranges_m[there], reflectances[there], instances, categories, surfaces
+        rays, ranges_m[there], reflectances[there], instances, categories, surfaces, ids, shown_m
     )
+
+
+def _mirrored(
+    instances: NDArray[np.uint16], first: np.integer, places_m: NDArray[np.float32]
+) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
+    """Instances and places in mirrors of hits that are mirrored from the ``first`` one on."""
+    ids, shown_m = np.zeros_like(instances), np.full((len(instances), 3), np.nan, np.float32)
+    ids[first:], shown_m[first:] = instances[first:], places_m
+    return ids, shown_m
 
 
 def _select_rays(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
@@ -298,7 +313,7 @@ def trace_scan(scene: Scene, lidar: Lidar, beams: LidarRays, cache: DeviceCache)
         instances.reshape(shape),
         categories.reshape(shape),
         surfaces.reshape(shape),
-        trace_secondary(inputs, first, beams.order, infrared, labels, cache),
+        trace_secondary(inputs, first, beams, infrared, labels, cache),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core.capture import Channel
+from gen_data.core.capture import LAYERS, MIRRORED, Channel
 from gen_data.core.scene import Scene
 from gen_data.renderers.warp.readback import Readback
 from gen_data.renderers.warp.scene.kernels import records
@@ -23,15 +23,27 @@ def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channe
     """All requested label channels, as documented at Channel."""
     drawn = draw_labels(frame, channels)
     images = read_images(drawn, frame.view.height, frame.view.width)
-    parts = trace_further(frame, channels)
+    parts = trace_further(frame, channels, drawn)
     return images | further_images(frame, images, parts, channels)
 
 
 def trace_further(
-    frame: CameraView, channels: frozenset[Channel]
+    frame: CameraView, channels: frozenset[Channel], drawn: "DrawnLabels"
 ) -> tuple[layers.SparseLabels, ...]:
-    """Requested labels of surfaces that a frame shows through glass and in mirrors."""
-    return layers.trace_behind(frame, channels), mirrors.trace_mirrors(frame, channels)
+    """Requested labels of surfaces that a frame shows through glass and in mirrors.
+
+    ``drawn`` are its labels of first surfaces.
+    """
+    if not channels & (LAYERS.keys() | MIRRORED.keys()) or not frame.world.layered:
+        return ()
+    known = dict(zip(drawn.channels, drawn.memory.parts, strict=True))
+    image = known.get(Channel.MATERIAL_LAYERS)
+    if image is None:
+        image = frame.cache.scratch("first materials", frame.pixels, wp.uint16)
+        layers.draw_materials(frame, image)
+    first = image.numpy()
+    behind = layers.trace_behind(frame, channels, first)
+    return behind, mirrors.trace_mirrors(frame, channels, first)
 
 
 def further_images(

@@ -40,24 +40,32 @@ class SparseLabels:
 
 def draw_materials(frame: CameraView, image: wp.array) -> None:
     """Material of the first surface at every pixel; see ``LAYER_MATERIALS``."""
-    inputs = [frame.world.record, frame.gbuffer.hits, materials_of(frame)]
-    frame.launch(surface_layers.label_materials, frame.pixels, inputs, [image])
+    # One thread per row on the CPU, where threads run one after the other anyway.
+    width = int(frame.view.width)
+    run = width if frame.cache.device.is_cpu else 1
+    inputs = [frame.world.record, frame.gbuffer.hits, materials_of(frame), width, run]
+    shape = (int(frame.view.height), width // run)
+    frame.launch(surface_layers.label_materials, shape, inputs, [image])
 
 
-def trace_behind(frame: CameraView, channels: frozenset[Channel]) -> SparseLabels:
-    """Surfaces behind the first one, [n, layers - 1]; none if no channel of layers is requested."""
+def trace_behind(
+    frame: CameraView, channels: frozenset[Channel], first: NDArray[np.uint16]
+) -> SparseLabels:
+    """Surfaces behind the first one, [n, layers - 1]; none if no channel of layers is requested.
+
+    ``first`` is the material of the first surface at every pixel, flat.
+    """
     wanted, later = channels & LAYERS.keys(), _layers_of(frame) - 1
     if not wanted or not later:
         return SparseLabels()
-    listed = list_pixels(frame, (material_packing.SEE_THROUGH,))
-    if not len(listed):
+    pixels = np.flatnonzero(first == material_packing.SEE_THROUGH)
+    if not len(pixels):
         return SparseLabels()
-    shape = (len(listed), later)
-    found = Readback.allocate(len(listed) * later, (wp.vec2i, float), frame.cache.device)
+    shape = (len(pixels), later)
+    found = Readback.allocate(len(pixels) * later, (wp.vec2i, float), frame.cache.device)
     outputs = [part.reshape(shape) for part in found.parts]
-    frame.launch(surface_layers.trace_behind, len(listed), ray_inputs(frame, listed), outputs)
+    frame.launch(surface_layers.trace_behind, len(pixels), ray_inputs(frame, pixels), outputs)
     hits, z_m = found.numpy()
-    pixels = listed.numpy().astype(np.intp)
     bodies, slots = np.moveaxis(hits.reshape(*shape, 2), -1, 0).astype(np.intp)
     there = bodies >= 0
     if frame.context.backdrop is not None:
@@ -70,22 +78,11 @@ def trace_behind(frame: CameraView, channels: frozenset[Channel]) -> SparseLabel
     return SparseLabels(pixels, {c: np.where(there, images[c](), LAYERS[c]) for c in wanted})
 
 
-def list_pixels(frame: CameraView, materials: tuple[int, ...]) -> wp.array:
-    """Pixels whose first surface has one of two materials, in any order; scratch memory."""
-    listed = frame.cache.scratch("pixels by material", frame.pixels, int)
-    if not frame.world.layered:
-        return listed[:0]
-    count = wp.zeros(1, dtype=int, device=frame.cache.device)
-    inputs = [frame.world.record, frame.gbuffer.hits, materials_of(frame)]
-    wanted = [materials[0], materials[-1]]
-    frame.launch(surface_layers.list_pixels, frame.pixels, [*inputs, *wanted], [count, listed])
-    return listed[: int(count.numpy()[0])]
-
-
-def ray_inputs(frame: CameraView, listed: wp.array) -> list[Any]:
+def ray_inputs(frame: CameraView, pixels: NDArray[np.intp]) -> list[Any]:
     """Inputs of kernels that follow the rays of listed pixels behind the first surface."""
     seen = [frame.gbuffer.hits, frame.gbuffer.z_m]
     materials = [materials_of(frame), material_packing.SEE_THROUGH]
+    listed = wp.array(pixels.astype(np.int32), dtype=int, device=frame.cache.device)
     return [frame.view, frame.world.record, *seen, *materials, listed]
 
 

@@ -15,20 +15,24 @@ from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.kernels import surface_layers
 
 
-def trace_mirrors(frame: CameraView, channels: frozenset[Channel]) -> layers.SparseLabels:
-    """Labels of the pixels that show a mirror; none if no such channel is requested."""
+def trace_mirrors(
+    frame: CameraView, channels: frozenset[Channel], first: NDArray[np.uint16]
+) -> layers.SparseLabels:
+    """Labels of the pixels that show a mirror; none if no such channel is requested.
+
+    ``first`` is the material of the first surface at every pixel, flat.
+    """
     wanted = channels & MIRRORED.keys()
     if not wanted:
         return layers.SparseLabels()
-    numbers = (material_packing.SEE_THROUGH, material_packing.MIRROR)
-    listed = layers.list_pixels(frame, numbers)
-    if not len(listed):
+    shows = (first == material_packing.SEE_THROUGH) | (first == material_packing.MIRROR)
+    pixels = np.flatnonzero(shows)
+    if not len(pixels):
         return layers.SparseLabels()
-    found = Readback.allocate(len(listed), (int, int, wp.vec3), frame.cache.device)
-    inputs = [*layers.ray_inputs(frame, listed), material_packing.MIRROR]
-    frame.launch(surface_layers.trace_mirrors, len(listed), inputs, found.parts)
+    found = Readback.allocate(len(pixels), (int, int, wp.vec3), frame.cache.device)
+    inputs = [*layers.ray_inputs(frame, pixels), material_packing.MIRROR]
+    frame.launch(surface_layers.trace_mirrors, len(pixels), inputs, found.parts)
     mirrors, bodies, places_m = found.numpy()
-    pixels = listed.numpy().astype(np.intp)
     there = bodies >= 0
     if frame.context.backdrop is not None:
         there &= ~plates.is_hidden(frame, frame.context.backdrop, pixels, mirrors[:, None])[:, 0]

@@ -146,16 +146,16 @@ def render_bands(
         rendered = reference = render_view(band.state, reference.context, (first, end), reference)
         gbuffer = rendered.gbuffer
         seen = (gbuffer.hits, gbuffer.z_m, gbuffer.weights)
-        drawn = label_images.draw_labels(rendered, channels).memory
+        drawn = label_images.draw_labels(rendered, channels)
         copies = list(zip(memory.parts, seen, strict=True))
-        copies += zip(labels.memory.parts, drawn.parts, strict=True)
+        copies += zip(labels.memory.parts, drawn.memory.parts, strict=True)
         if light is not None:
             copies.append((radiance, light(rendered)))
         place, begin = band.first * lens.width_px, (band.first - first) * lens.width_px
         count = (band.end - band.first) * lens.width_px
         for image, part in copies:
             wp.copy(image, part, place, begin, count)
-        parts = label_images.trace_further(rendered, channels)
+        parts = label_images.trace_further(rendered, channels, drawn)
         further += (part.moved(begin, count, place) for part in parts)
     images = label_images.read_images(labels, lens.height_px, lens.width_px)
     images |= label_images.further_images(reference, images, further, channels)

@@ -530,6 +530,7 @@ def trace_mirrors(
     ranges_m: wp.array[float],
     reflectances: wp.array[float],
     hits: wp.array[wp.vec2i],
+    places_m: wp.array[wp.vec3],
 ):
     """Surfaces that selected rays hit after one reflection at a mirror.
 
@@ -538,6 +539,7 @@ def trace_mirrors(
     Args:
         waters: Share of a puddle at each selected ray's end; 0 if the material itself is the
             mirror.
+        places_m: Points of these surfaces, lidar frame; empty if they are not requested.
     """
     t = wp.tid()
     for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
@@ -567,6 +569,8 @@ def trace_mirrors(
                 material = records.surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[j] = wp.vec2i(hit.body, material)
                 ranges_m[j] = first_m[i] + ray_queries.LASER_OFFSET_M + hit.range_m
+                if places_m.shape[0] > 0:
+                    places_m[j] = ray.origin_m + ray.direction * hit.range_m
                 cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
                 kept *= kept * echo_share(scan, lights[material], ranges_m[j])
                 reflectances[j] = kept * backscatter(lights[material], cosine)

@@ -18,44 +18,32 @@ def label_materials(
     world: records.World,
     hits: wp.array[wp.vec2i],
     materials: wp.array[wp.uint16],
+    width: int,
+    run: int,
     labels: wp.array[wp.uint16],
 ):
-    """Number of the material at every pixel; 0 for the background."""
-    i = wp.tid()
-    label = wp.uint16(0)
-    if hits[i][0] >= 0:
-        label = materials[records.surface_index(world, hits[i])]
-    labels[i] = label
-
-
-@wp.kernel
-def list_pixels(
-    world: records.World,
-    hits: wp.array[wp.vec2i],
-    materials: wp.array[wp.uint16],
-    one: int,
-    other: int,
-    count: wp.array[int],
-    pixels: wp.array[int],
-):
-    """List the pixels whose first surface has one of two materials, in any order.
+    """Number of the material at every pixel; 0 for the background.
 
     Args:
         world: The scene.
         hits: First surface of every pixel.
         materials: Number of each material.
-        one, other: Numbers of the wanted ones.
-        count: Length of the list; 0 at first.
-        pixels: The list.
+        width: Pixels of a row.
+        run: Pixels in a row per thread: neighbours on one face share its material.
+        labels: The numbers.
     """
-    i = wp.tid()
-    if hits[i][0] >= 0:
-        material = int(materials[records.surface_index(world, hits[i])])
-        wanted = material == one
-        if material == other:
-            wanted = True
-        if wanted:
-            pixels[wp.atomic_add(count, 0, 1)] = i
+    y, segment = wp.tid()
+    begin = y * width + segment * run
+    known = wp.vec2i(-1, -1)
+    label = wp.uint16(0)
+    for i in range(begin, begin + run):
+        hit = hits[i]
+        if hit[0] != known[0] or hit[1] != known[1]:
+            known = hit
+            label = wp.uint16(0)
+            if hit[0] >= 0:
+                label = materials[records.surface_index(world, hit)]
+        labels[i] = label
 
 
 @wp.func
@@ -104,7 +92,7 @@ def trace_behind(
         hits, depths: First surface of every pixel, as of GBuffer.
         materials: Number of each material.
         see_through: Number of those that rays continue behind.
-        pixels: The list.
+        pixels: The listed pixels.
         behind: (body, material) of each ray's later surfaces; (-1, -1) for none.
         z_m: Their depths along the optical axis.
     """
