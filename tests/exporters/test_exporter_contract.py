@@ -13,7 +13,7 @@ from tests.exporters.test_occupancy import gridded
 from tests.exporters.test_opendrive_export import town
 from tests.tiers import sampled
 
-PACKED = {"huggingface", "opendrive", "rlds", "tfrecord", "webdataset", "rerun"}
+PACKED = {"huggingface", "map_vectors", "opendrive", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
 EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
 """Formats with regions that a score leaves out class by class; see ``test_ignored_objects``."""
@@ -40,7 +40,7 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
         return drive_info(world), world.reach()
     if exporter.type == "occupancy":
         return drive_info(world), gridded(world)
-    if exporter.type == "opendrive":
+    if exporter.type in ("map_vectors", "opendrive"):
         return town(world)
     if exporter.type == "bop":
         return world.info(7), world.with_bodies(world.samples)
