@@ -10,6 +10,7 @@ from gen_data.core.plugins import PluginTable
 TABLE = PluginTable[Exporter](
     "exporter",
     {
+        "argoverse2": "gen_data.exporters.argoverse2:Argoverse2",
         "birdseye": "gen_data.exporters.birdseye:Birdseye",
         "bop": "gen_data.exporters.bop:Bop",
         "calibration": "gen_data.exporters.calibration:CalibrationFiles",

@@ -22,6 +22,7 @@ from gen_data.core.scene import Camera, Instance, Lane, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
 from tests.exporters import (
+    test_argoverse2,
     test_birdseye,
     test_bop,
     test_calibration,
@@ -276,6 +277,8 @@ def solo(made: Made) -> list[str]:
 
 
 ROWS = {
+    "argoverse2": row(test_argoverse2.town, "cameras, centres, points, solids",
+        lambda m: test_argoverse2.check_log(m.folder, m.samples)),
     "birdseye": row(street, "maps, surroundings",
         test_birdseye.test_layers_are_images_and_frames_tell_what_is_on_them),
     "bop": row(bodies, "depths, masks, poses",

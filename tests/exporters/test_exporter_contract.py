@@ -23,7 +23,7 @@ OWN_IMAGES = PACKED | {
     "hdf5", "lerobot", "mcap", "occupancy", "pointclouds", "semantickitti", "tables", "usd"
 }  # fmt: skip
 """Formats without image files of the shards."""
-TRACKS = {"kitti_raw", "nuscenes"}
+TRACKS = {"argoverse2", "kitti_raw", "nuscenes"}
 """Formats of tracks, from which an ignored object disappears and a missing one does not."""
 
 
@@ -40,7 +40,7 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
         return drive_info(world), world.reach()
     if exporter.type == "occupancy":
         return drive_info(world), gridded(world)
-    if exporter.type in ("map_vectors", "opendrive"):
+    if exporter.type in ("argoverse2", "map_vectors", "opendrive"):
         return town(world)
     if exporter.type == "bop":
         return world.info(7), world.with_bodies(world.samples)
