@@ -10,6 +10,7 @@ from gen_data.core.plugins import PluginTable
 TABLE = PluginTable[Exporter](
     "exporter",
     {
+        "argoverse2": "gen_data.exporters.argoverse2:Argoverse2",
         "birdseye": "gen_data.exporters.birdseye:Birdseye",
         "bop": "gen_data.exporters.bop:Bop",
         "calibration": "gen_data.exporters.calibration:CalibrationFiles",
@@ -31,6 +32,7 @@ TABLE = PluginTable[Exporter](
         "label_studio": "gen_data.exporters.label_studio:LabelStudio",
         "language": "gen_data.exporters.language:LanguageJsonl",
         "lerobot": "gen_data.exporters.lerobot:LeRobot",
+        "map_vectors": "gen_data.exporters.map_vectors:MapVectors",
         "mcap": "gen_data.exporters.mcap:Mcap",
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",
         "nuscenes": "gen_data.exporters.nuscenes:NuScenes",

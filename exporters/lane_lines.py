@@ -152,13 +152,20 @@ def _places(scene: Scene, camera: Camera, border: LaneBorder, stretch: BorderTru
     """Points [n, 3] of a stretch in the camera frame: of the border, where it is projected to."""
     p_camera, uv = project_border(scene, camera, border)
     found = np.isfinite(uv).all(axis=1)
-    p_camera, uv = p_camera[found], uv[found].round(2)
-    rows = {place: row for row, place in enumerate(map(tuple, uv.tolist()))}
-    wanted = [
-        rows[place] if place in rows else int(((uv - place) ** 2).sum(axis=1).argmin())
-        for place in stretch.points_px
-    ]
-    return np.asarray(p_camera[wanted])
+    p_camera, uv = p_camera[found], uv[found]
+    wanted = np.array(stretch.points_px)
+    keys, own = _keys(uv), _keys(wanted)
+    order = np.argsort(keys, kind="stable")
+    rows = order[np.minimum(np.searchsorted(keys, own, sorter=order), len(keys) - 1)]
+    for k in np.flatnonzero(keys[rows] != own):
+        rows[k] = ((uv - wanted[k]) ** 2).sum(axis=1).argmin()
+    return np.asarray(p_camera[rows])
+
+
+def _keys(uv: Array) -> NDArray[np.int64]:
+    """A number per place, in hundredths of pixels, as annotations state them."""
+    places = np.clip(np.rint(uv * 100.0), -(2**30), 2**30).astype(np.int64)
+    return np.asarray(places[:, 0] * 2**32 + places[:, 1])
 
 
 def _common_paint(divider: Divider, p_world: Array) -> Paint:

@@ -26,6 +26,7 @@ Reference: map expansion of nuScenes (``map_api.py`` of nuscenes-devkit, and its
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,11 @@ class _Writer:
     token: Token
     layers: dict[str, Any] = field(default_factory=_layers)
     _nodes: dict[tuple[float, float], str] = field(default_factory=dict)
+
+    @cached_property
+    def _node_token(self) -> str:
+        """First digits of the tokens of all nodes."""
+        return self.token("node")[:24]
 
     def add_areas(self) -> None:
         """Add the layers that consist of areas only."""
@@ -237,7 +243,8 @@ class _Writer:
             for p, low in zip(point, self.low_m, strict=False)
         )
         if (x, y) not in self._nodes:
-            made = self._nodes[x, y] = self.token("node", x, y)
+            # Hashing the place of each would take longer than everything else.
+            made = self._nodes[x, y] = f"{self._node_token}{len(self._nodes):08x}"
             self.layers["node"].append({"token": made, "x": x, "y": y})
         return self._nodes[x, y]
 

@@ -23,6 +23,8 @@ HOLE_M2 = 1.0
 """Smaller holes are covers of manholes and drains, over which vehicles drive."""
 CRUMB_M2 = 0.01
 """Smaller pieces of areas are rounding."""
+LARGE_M2 = 1.0
+"""Smaller pieces are mostly patches and traces on larger ones, which need not be joined."""
 DECIMALS = 4
 """Corners of meshes are rounded to tenths of millimetres: pieces that meet have no cracks."""
 BESIDE_M, ACROSS_M = 0.45, 0.4
@@ -241,23 +243,21 @@ class PaintIndex:
             _covered(stations, spans, beside & chosen)
             for chosen in (beside, side_m > DOUBLE_M, side_m < -DOUBLE_M, self.yellow[near])
         )
-        double = left & right
-        made = []
-        for place in at_m.tolist():
-            around = np.abs(stations - place) <= WINDOW_M
-            share = float(some[around].mean())
-            if share < DASHED:
-                made.append(Paint())
-                continue
-            painted = around & some
-            made.append(
-                Paint(
-                    "solid" if share >= SOLID else "dashed",
-                    bool(double[painted].mean() > 0.5),
-                    bool(tinted[painted].mean() > 0.5),
-                )
+        low = np.searchsorted(stations, at_m - WINDOW_M)
+        high = np.searchsorted(stations, at_m + WINDOW_M, "right")
+        painted, double, tint = (
+            np.diff(np.concatenate([[0], np.cumsum(flags)])[np.stack([low, high])], axis=0)[0]
+            for flags in (some, some & left & right, some & tinted)
+        )
+        share = painted / np.maximum(high - low, 1)
+        return tuple(
+            Paint()
+            if part < DASHED
+            else Paint("solid" if part >= SOLID else "dashed", 2 * two > count, 2 * dyed > count)
+            for part, count, two, dyed in zip(
+                share.tolist(), painted.tolist(), double.tolist(), tint.tolist(), strict=True
             )
-        return tuple(made)
+        )
 
 
 def _covered(
@@ -287,7 +287,12 @@ def _level(body: Body) -> Body:
 def _union(triangles: Array) -> Geometry:
     import shapely
 
-    return _tidy(shapely.union_all(shapely.polygons(triangles[..., :2].round(DECIMALS))))
+    pieces = shapely.polygons(triangles[..., :2].round(DECIMALS))
+    large = shapely.area(pieces) > LARGE_M2
+    base = shapely.union_all(pieces[large])
+    shapely.prepare(base)
+    small = pieces[~large]
+    return _tidy(shapely.union_all([base, *small[~shapely.covers(base, small)]]))
 
 
 def _join(areas: Iterable[Geometry]) -> Geometry:
@@ -331,9 +336,9 @@ def _segments(driving: Sequence[Lane], plans: Mapping[str, Geometry]) -> Iterato
     """Segments of all roads; a body with several roads is divided at its intersections."""
     for road in dict.fromkeys(lane.road for lane in driving):
         own = [lane for lane in driving if lane.road == road]
-        strips = _join(_shape(lane_area([lane])).buffer(0) for lane in own)
-        plan = plans.get(road, strips)
-        plan = strips if plan.is_empty else plan
+        plan = plans.get(road)
+        if plan is None or plan.is_empty:
+            plan = _join(_shape(lane_area([lane])).buffer(0) for lane in own)
         crossing = [lane for lane in own if lane.junction]
         parts = [(plan, bool(crossing))]
         if 0 < len(crossing) < len(own):

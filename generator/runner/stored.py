@@ -324,7 +324,7 @@ def read_capture(
     def cloud(name: str) -> PointCloud:
         scan = labels.scans[name]
         if not has_points:
-            return PointCloud(name, scan.lidar, np.zeros(0, POINT), scan.time_s, scan.faults)
+            return PointCloud(name, scan.lidar, np.zeros(0, POINT), scan.time_s, faults=scan.faults)
         path = cloud_path(folder, name, index)
         points = _load(path, POINT, read)
         if not np.isfinite(points["position_m"]).all():

@@ -30,6 +30,7 @@ from gen_data.core.scene import Camera, Instance, Lane, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
 from tests.exporters import (
+    test_argoverse2,
     test_birdseye,
     test_bop,
     test_calibration,
@@ -48,6 +49,7 @@ from tests.exporters import (
     test_lane_formats,
     test_language,
     test_lerobot,
+    test_map_vectors,
     test_mcap,
     test_motchallenge,
     test_nuscenes,
@@ -290,6 +292,8 @@ def solo(made: Made) -> list[str]:
 
 
 ROWS = {
+    "argoverse2": row(test_argoverse2.town, "cameras, centres, points, solids",
+        lambda m: test_argoverse2.check_log(m.folder, m.samples)),
     "birdseye": row(street, "maps, surroundings",
         test_birdseye.test_layers_are_images_and_frames_tell_what_is_on_them),
     "bop": row(bodies, "depths, masks, poses",
@@ -336,6 +340,8 @@ ROWS = {
         labels, lambda m: test_language.assert_said(m.folder, m.samples)),
     "lerobot": row(reach, "arms, photographs",
         lambda m: test_lerobot.faults(m.folder / "train/toys_arm", m.samples[:4])),
+    "map_vectors": row(test_map_vectors.town, "streets",
+        lambda m: test_map_vectors.check_files(m.folder)),
     "mcap": row(drive,
         "boxes, cameras, categories, centres, photographs, point ids, points, solids, times",
         lambda m: test_mcap.faults(m.folder / "train/street-000000.mcap", m.samples[:4])),

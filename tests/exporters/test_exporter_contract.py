@@ -14,7 +14,7 @@ from tests.exporters.test_opendrive_export import town
 from tests.exporters.test_tapvid import tracked
 from tests.tiers import sampled
 
-PACKED = {"huggingface", "opendrive", "rlds", "tfrecord", "webdataset", "rerun"}
+PACKED = {"huggingface", "map_vectors", "opendrive", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
 EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
 """Formats with regions that a score leaves out class by class; see ``test_ignored_objects``."""
@@ -25,7 +25,7 @@ OWN_IMAGES = PACKED | {
     "usd",
 }  # fmt: skip
 """Formats without image files of the shards."""
-TRACKS = {"kitti_raw", "nuscenes"}
+TRACKS = {"argoverse2", "kitti_raw", "nuscenes"}
 """Formats of tracks, from which an ignored object disappears and a missing one does not."""
 
 
@@ -42,7 +42,7 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
         return drive_info(world), world.reach()
     if exporter.type == "occupancy":
         return drive_info(world), gridded(world)
-    if exporter.type == "opendrive":
+    if exporter.type in ("argoverse2", "map_vectors", "opendrive"):
         return town(world)
     if exporter.type == "tapvid":
         return drive_info(world), tracked(world)
