@@ -36,15 +36,15 @@ import numpy as np
 
 from gen_data.core import capture, lane_geometry, motion
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.sample import BirdseyeMap, BorderTruth, EgoTruth, Sample
+from gen_data.core.sample import BirdseyeMap, EgoTruth, Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters import base, image_files, png, sequences
 from gen_data.exporters.conventions import ANY_LENS, SAMPLE, Conventions
+from gen_data.exporters.lane_lines import columns_at
 
 FRAMES, LANES = "frames.jsonl", "lanes"
 ROWS_PX = 10
 """Spacing of the image rows at which TuSimple lists columns."""
-ABSENT = -2
 MARGIN = 1.2
 """Borders are listed up to this multiple of the map's reach."""
 DECIMALS = 4
@@ -157,7 +157,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "index": sample.index,
         "raw_file": f"{sensor}/{capture.Channel.RGB.value}/{sample.index:09d}{suffix}",
         "h_samples": rows,
-        "lanes": [columns_at(border, rows) for border in borders],
+        "lanes": [columns_at(np.array(border.points_px), rows) for border in borders],
         "borders": [
             {
                 "name": border.border,
@@ -168,21 +168,3 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
             for border in borders
         ],
     }
-
-
-def columns_at(border: BorderTruth, rows: Sequence[int]) -> list[float]:
-    """Columns at which a line crosses image rows, with integer pixel centres; -2 = no crossing.
-
-    Of several crossings of a row, the one nearest to the start of the line is listed.
-    """
-    u, v = (np.array([point[k] for point in border.points_px]) - 0.5 for k in (0, 1))
-    columns: list[float] = []
-    for row in rows:
-        crossing = np.flatnonzero((v[:-1] - row) * (v[1:] - row) <= 0.0)
-        if len(crossing) == 0:
-            columns.append(ABSENT)
-            continue
-        k = crossing[0]
-        share = (row - v[k]) / (v[k + 1] - v[k]) if v[k + 1] != v[k] else 0.0
-        columns.append(round(float(u[k] + share * (u[k + 1] - u[k])), 2) + 0.0)
-    return columns

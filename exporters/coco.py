@@ -33,6 +33,8 @@ the values of ``weather`` other than zero. Annotators that are enabled add these
 ``visible_fraction``, ``occlusion``, ``truncation``
     Fractions in [0, 1]: visible pixels of the silhouette; hidden pixels of its part inside the
     image; silhouette pixels outside the image.
+``detectability``
+    d' of the ideal observer: contrast over noise, from 0.
 ``box3d``
     Camera frame: ``center_m``, full ``size_m``, ``quaternion_wxyz``.
 ``T_camera_object``
@@ -251,7 +253,7 @@ def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, An
 def _optional_keys(thing: ObjectTruth) -> dict[str, Any]:
     keys: dict[str, Any] = {
         name: round(share, DECIMALS)
-        for name in ("visible_fraction", "occlusion", "truncation")
+        for name in ("visible_fraction", "occlusion", "truncation", "detectability")
         if (share := getattr(thing, name)) is not None
     }
     if thing.box3d_camera is not None:

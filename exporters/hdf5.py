@@ -123,7 +123,7 @@ class Hdf5(base.ExporterBase):
                 if camera not in sample.truth or not channels:
                     continue
                 arrays = {
-                    KEYS.get(c, c.value): _read(info, shard_dir, camera, c, sample.index)
+                    KEYS.get(c, c.value): _read(info, shard_dir, sample, camera, c)
                     for c in channels
                 }
                 arrays |= _camera_arrays(sample.truth[camera])
@@ -192,10 +192,12 @@ def _shuffled(array: NDArray[Any]) -> bytes:
 
 
 def _read(
-    info: DatasetInfo, shard_dir: Path, camera: str, channel: Channel, index: int
+    info: DatasetInfo, shard_dir: Path, sample: Sample, name: str, channel: Channel
 ) -> NDArray[Any]:
-    path = info.media_path(shard_dir, camera, channel, index)
-    pixels = image_files.read_image(path, channel, info.depth_scale_m)
+    path = info.media_path(shard_dir, name, channel, sample.index)
+    camera = sample.truth[name].camera.intrinsics
+    size_px = (camera.width_px, camera.height_px)
+    pixels = image_files.read_image(path, channel, info.depth_scale_m, size_px)
     if channel is Channel.NORMALS:
         pixels = ((pixels * BLENDER_AXES + 1.0) * 0.5).astype(np.float32)
     return pixels

@@ -69,6 +69,7 @@ WIDE = frozenset(
         capture.Channel.FLOW_FORWARD,
         capture.Channel.FLOW_BACKWARD,
         capture.Channel.SCENE_FLOW,
+        capture.Channel.MIRRORED_POSITION,
         capture.Channel.OBJECT_COORDINATES,
     }
 )
@@ -358,6 +359,7 @@ Categories: {categories}.
 | `image` | 8-bit sRGB |
 | `depth`, `range` | 16-bit, {scale} m per unit; 0 = nothing |
 | `instance`, `part`, `category` | 16-bit ids; 0 = nothing |
+| `depth_layers`, `instance_layers`, `material_layers` | 16-bit, all layers below one another |
 | `objects.bbox` | x, y, width, height [px] of the visible pixels; pixel i covers [i, i + 1) |
 | `objects.category` | index from 0 into the names of the feature |
 | `objects.rle` | COCO's compressed runs of the visible mask, of size height x width |

@@ -20,6 +20,12 @@ flow_backward                                down, then 1, as KITTI's flow bench
 flow_occluded_...     8-bit grey             255 = hidden, or not in the image; 0 = seen
 scene_flow            16-bit RGB             ``round(metres / depth_scale_m) + 32768`` per axis;
                                              (0, 0, 0) = nothing, or beyond 32767 units
+depth_layers,         16-bit grey            as depth or instance, numbers of materials; all layers
+instance_layers,                             below one another, the first on top: the image is as
+material_layers                              many times higher as there are layers
+seen_in_mirror        16-bit grey            the id; 0
+mirrored_position     16-bit RGB             ``round(metres / (8 depth_scale_m)) + 32768`` per axis;
+                                             (0, 0, 0) = nothing, or beyond 32767 units
 ====================  =====================  =====================================================
 
 Filters predict from the left pixel, for ids from the pixel above. Compression uses the highest
@@ -37,7 +43,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.capture import PNG, Channel, ImageEncoding
+from gen_data.core.capture import LAYERS, PNG, Channel, ImageEncoding
 from gen_data.core.errors import ConfigError, SampleError, StorageError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
@@ -50,6 +56,8 @@ DEPTH_UNITS_MAX = 65_535
 """Largest value of a 16-bit depth image."""
 
 FLOW_UNITS_PER_PX = 64
+DEPTHS_PER_UNIT = {Channel.SCENE_FLOW: 1, Channel.MIRRORED_POSITION: 8}
+"""Units of depth per unit of other lengths: the world is larger than a view of it."""
 SIGNED_ZERO = 32_768
 """Value of 0 in 16-bit images of signed quantities."""
 
@@ -76,6 +84,11 @@ ENCODING = {
     Channel.FLOW_OCCLUDED_FORWARD: (RowFilter.UP, 2),
     Channel.FLOW_OCCLUDED_BACKWARD: (RowFilter.UP, 2),
     Channel.SCENE_FLOW: (RowFilter.SUB, 1),
+    Channel.DEPTH_LAYERS: (RowFilter.SUB, 1),
+    Channel.INSTANCE_LAYERS: (RowFilter.UP, 2),
+    Channel.MATERIAL_LAYERS: (RowFilter.UP, 2),
+    Channel.SEEN_IN_MIRROR: (RowFilter.UP, 2),
+    Channel.MIRRORED_POSITION: (RowFilter.SUB, 1),
 }
 """Row filter and compression level of each channel, measured on rendered images."""
 
@@ -154,6 +167,7 @@ PIXELS = {
     Channel.FLOW_OCCLUDED_FORWARD: (np.uint8, 1),
     Channel.FLOW_OCCLUDED_BACKWARD: (np.uint8, 1),
     Channel.SCENE_FLOW: (np.uint16, 3),
+    Channel.MIRRORED_POSITION: (np.uint16, 3),
 }
 """Type and number of components of the pixels in a file; other channels: uint16, 1."""
 
@@ -171,7 +185,7 @@ def read_image(
         path: Image file.
         channel: Channel of the image.
         depth_scale_m: Metres per unit of depth and range images.
-        size_px: Expected width and height; None = any.
+        size_px: Expected width and height of the camera's image; None = any. Layers need it.
         read: Reads a file.
 
     Returns:
@@ -179,10 +193,16 @@ def read_image(
 
     Raises:
         StorageError: the file is missing, no image, or one of another channel or size.
+        ValueError: layers without ``size_px``.
     """
+    if channel in LAYERS and size_px is None:
+        raise ValueError(f"{channel}: the height of a layer is needed to tell layers apart")
     pixels = read_pixels(path, read=read)
     kind, components = PIXELS.get(channel, (np.uint16, 1))
     width_px, height_px = size_px or (pixels.shape[1], pixels.shape[0])
+    if channel in LAYERS:
+        # Any number of layers, at least one.
+        height_px *= max(pixels.shape[0] // height_px, 1)
     shape = (height_px, width_px) if components == 1 else (height_px, width_px, components)
     if pixels.dtype != kind or pixels.shape != shape:
         raise StorageError(
@@ -190,7 +210,10 @@ def read_image(
             f"{np.dtype(kind)} {list(shape)} of channel "
             f"{channel.value}; generate the data set again"
         )
-    return _decode_pixels(channel, pixels, depth_scale_m)
+    image = _decode_pixels(channel, pixels, depth_scale_m)
+    if channel in LAYERS and size_px:
+        return np.moveaxis(image.reshape(-1, size_px[1], width_px), 0, -1)
+    return image
 
 
 def read_pixels(
@@ -220,14 +243,14 @@ def read_pixels(
 def _decode_pixels(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
     """Convert the pixels of a PNG to physical values."""
     match channel:
-        case Channel.Z_DEPTH | Channel.RANGE | Channel.MEASURED_DEPTH:
+        case Channel.Z_DEPTH | Channel.RANGE | Channel.MEASURED_DEPTH | Channel.DEPTH_LAYERS:
             return np.asarray(depths_of_units(depth_scale_m)[pixels])
         case Channel.DISPARITY | Channel.DISPARITY_VISIBLE:
             return np.asarray(pixels / 256.0, np.float32)
         case Channel.FLOW_FORWARD | Channel.FLOW_BACKWARD:
             return _decode_signed(pixels, 1.0 / FLOW_UNITS_PER_PX)[..., :2]
-        case Channel.SCENE_FLOW:
-            return _decode_signed(pixels, depth_scale_m)
+        case Channel.SCENE_FLOW | Channel.MIRRORED_POSITION:
+            return _decode_signed(pixels, DEPTHS_PER_UNIT[channel] * depth_scale_m)
         case Channel.FLOW_OCCLUDED_FORWARD | Channel.FLOW_OCCLUDED_BACKWARD:
             return np.asarray(pixels > 0, np.uint8)
         case Channel.NORMALS:
@@ -314,11 +337,14 @@ def link_or_copy(source: Path, target: Path) -> None:
 
 
 def _encode_pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
+    if channel in LAYERS:
+        image = np.moveaxis(image, -1, 0).reshape(-1, image.shape[1])
     convert: dict[Channel, Callable[[], NDArray[Any]]] = {
         Channel.RGB: lambda: image,
         Channel.Z_DEPTH: lambda: depth_units(image, depth_scale_m),
         Channel.RANGE: lambda: depth_units(image, depth_scale_m),
         Channel.MEASURED_DEPTH: lambda: depth_units(image, depth_scale_m),
+        Channel.DEPTH_LAYERS: lambda: depth_units(image, depth_scale_m),
         Channel.DISPARITY: lambda: disparity_units(image),
         Channel.DISPARITY_VISIBLE: lambda: disparity_units(image),
         Channel.FLOW_FORWARD: lambda: flow_units(image),
@@ -326,6 +352,9 @@ def _encode_pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) 
         Channel.FLOW_OCCLUDED_FORWARD: lambda: image * np.uint8(255),
         Channel.FLOW_OCCLUDED_BACKWARD: lambda: image * np.uint8(255),
         Channel.SCENE_FLOW: lambda: _signed_units(image, depth_scale_m),
+        Channel.MIRRORED_POSITION: lambda: _signed_units(
+            image, DEPTHS_PER_UNIT[channel] * depth_scale_m
+        ),
         Channel.NORMALS: lambda: np.rint((image + 1.0) * 0.5 * 255.0).astype(np.uint8),
         # Boxes are rounded to a micrometre: a surface may lie that much outside [0, 1], and
         # 65536 would wrap to 0.

@@ -48,6 +48,7 @@ class LabelMap(Strict):
         min_box_px: Smallest side of the box of the visible pixels.
         max_truncation: Largest share of the silhouette outside the image (annotation
             ``visibility``).
+        min_detectability: Smallest contrast over noise, d' (annotation ``detectability``); 0 = any.
         below: Objects that miss one of these limits: left out, or kept as ignored regions.
     """
 
@@ -58,6 +59,7 @@ class LabelMap(Strict):
     min_visible_fraction: float = Field(0.0, ge=0.0, le=1.0)
     min_box_px: int = Field(1, ge=1)
     max_truncation: float = Field(1.0, ge=0.0, le=1.0)
+    min_detectability: float = Field(0.0, ge=0.0)
     below: Literal["drop", "ignore"] = "drop"
 
     @field_validator("classes", mode="before")
@@ -104,7 +106,8 @@ class LabelMap(Strict):
     def needs(self) -> frozenset[str]:
         """Names of the annotators that its limits read."""
         limited = self.min_visible_fraction > 0.0 or self.max_truncation < 1.0
-        return frozenset({"visibility"} if limited else ())
+        read = {"visibility": limited, "detectability": self.min_detectability > 0.0}
+        return frozenset(name for name, is_read in read.items() if is_read)
 
     @property
     def classes_of(self) -> Mapping[str, Sources]:
@@ -311,6 +314,7 @@ class AppliedLabelMap:
                 and thing.visible_fraction < limits.min_visible_fraction
             )
             or (thing.truncation is not None and thing.truncation > limits.max_truncation)
+            or (thing.detectability is not None and thing.detectability < limits.min_detectability)
         )
 
     def _map_instance(self, instance: Instance) -> Instance:

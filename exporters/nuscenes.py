@@ -9,6 +9,8 @@
     sweeps/...                           the same between key frames
     lidarseg/v1.0-mini/*_lidarseg.bin    panoptic/v1.0-mini/*_panoptic.npz    of key frames
     maps/000003.png                      driveable surface of world 3
+    maps/expansion/<location>.json       its vector map, with ``map_expansion``
+    can_bus/scene-2000_pose.json         motion of the ego, with ``can_bus``
 
 * **Scenes** are sequences; a log is a world, with a separate map and location. ``splits.json``
   lists the scenes of ``all`` and of each split of the data set: ``gen_train``, ``gen_val`` and
@@ -16,6 +18,10 @@
 * **Key frames** are scans of LIDAR_TOP at least ``key_frame_s`` apart.
 * **The global frame** is the world, with the map's corner at (0, 0), as the devkit expects:
   ``world_origin`` in ``log.json`` is the origin of the world in it.
+* **Map expansion**: all layers of version 1.3 (``nuscenes_map.py``). ``NuScenesMap`` reads it
+  under the location of the log, once ``map_api.locations`` has that name.
+* **CAN bus**: pose, IMU, steering angle and speed (``nuscenes_can_bus.py``); scenes then have the
+  names ``scene-2000``, ..., since ``NuScenesCanBus`` accepts no others.
 * **The ego** is the rig that carries LIDAR_TOP; every reading has the ego's pose at its instant.
 * **Images** are PNG: links to the images of the shards. Pixel centres of ``camera_intrinsic`` are
   whole numbers.
@@ -41,18 +47,39 @@ from pydantic import Field
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.exporters import base, fragments, image_files, nuscenes_classes, nuscenes_tables
+from gen_data.core.scene import Scene
+from gen_data.exporters import (
+    base,
+    fragments,
+    image_files,
+    nuscenes_can_bus,
+    nuscenes_classes,
+    nuscenes_tables,
+)
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.nuscenes_frames import Channel
-from gen_data.exporters.nuscenes_recording import LIDAR_TOP, Recording, key_frames
-from gen_data.exporters.nuscenes_shard import ShardWriter, label_path, map_file, reading_path
+from gen_data.exporters.nuscenes_recording import LIDAR_TOP, Recording, key_frames, scene_name
+from gen_data.exporters.nuscenes_shard import (
+    ShardWriter,
+    expansion_file,
+    label_path,
+    map_file,
+    reading_path,
+)
 from gen_data.exporters.sensor_selection import check_pinholes, laser_scanner, rgb_cameras
-from gen_data.exporters.sequences import FRAMES, Frame, write_frames
+from gen_data.exporters.sequences import (
+    FRAMES,
+    Frame,
+    check_sequence_count,
+    write_frames,
+    write_json,
+)
 
 SPLITS = ("train", "val", "test")
+CAN_BUS = "can_bus"
 
 
-class NuScenes(base.ExporterBase):
+class NuScenes(base.AssetExporter):
     """nuScenes with lidarseg and panoptic labels: all cameras, laser scanners and radars."""
 
     type: Literal["nuscenes"] = "nuscenes"
@@ -78,6 +105,10 @@ class NuScenes(base.ExporterBase):
     """Instant of a moving object's box: when pulses hit it, or the step's."""
     box_margin_m: float = Field(0.002, ge=0, le=0.1)
     """How much larger boxes are on every side: points on the surface are inside."""
+    map_expansion: bool = False
+    """Whether to write the vector map of each world as well."""
+    can_bus: bool = False
+    """Whether to write the ego's motion between the steps; scenes are named ``scene-2000``, ..."""
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -94,18 +125,42 @@ class NuScenes(base.ExporterBase):
                 f"expected at least one of: {', '.join(known)}. Use coco for other categories"
             )
         check_pinholes(info, rgb_cameras(info), self.type)
+        if self.map_expansion:
+            base.check_installed(self.type, "shapely")
+        if self.can_bus:
+            check_sequence_count(info, nuscenes_can_bus.SCENES_MAX, self.type)
+
+    def check_scene(self, scene: Scene) -> None:
+        """Reject a map expansion of worlds without a street.
+
+        Raises:
+            ConfigError: the text names the missing element.
+        """
+        if self.map_expansion and not any(lane.kind == "driving" for lane in scene.lanes):
+            raise ConfigError(
+                f"exporter '{self.type}': map_expansion needs a street, but the scene has no "
+                "driving lane; add an element 'road', or leave map_expansion out"
+            )
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write scans, detections, point labels and maps, and a line per sample.
 
         Raises:
-            ConfigError: see ``check``, or too many objects of a category.
+            ConfigError: see ``check``, too many objects of a category, or ``can_bus`` without a
+                vehicle.
         """
         self.check(info)
-        writer = ShardWriter(
-            info, self._channels(info), shard_dir, self.boxes_at, self.box_margin_m
-        )
-        write_frames(shard_dir / self.type, [writer.write(sample) for sample in samples])
+        roads = self.library if self.map_expansion else None
+        channels, margin_m = self._channels(info), self.box_margin_m
+        writer = ShardWriter(info, channels, shard_dir, self.boxes_at, margin_m, roads)
+        rows, messages = [], []
+        for sample in samples:
+            rows.append(writer.write(sample))
+            if self.can_bus:
+                messages.append(writer.can_messages(sample, self.library))
+        write_frames(shard_dir / self.type, rows)
+        if self.can_bus:
+            fragments.write_fragment(shard_dir / self.type, CAN_BUS, messages)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the tables, sequence by sequence, and link all files."""
@@ -127,6 +182,8 @@ class NuScenes(base.ExporterBase):
                 self._link_files(info, recording, dataset_dir)
                 names["all"].append(recording.name)
                 names.setdefault(f"gen_{split}", []).append(recording.name)
+                if self.can_bus:
+                    _write_can_bus(recording, shard_dirs, dataset_dir / CAN_BUS)
         nuscenes_tables.write_splits(dataset_dir / self.version, names)
 
     def top(self, info: DatasetInfo) -> str:
@@ -174,7 +231,8 @@ class NuScenes(base.ExporterBase):
         for _, group in groupby(rows, key=lambda item: item[1]["sequence"]):
             frames = [Frame(shard_dir, row) for shard_dir, row in group]
             if keys := key_frames(frames, self.key_frame_s):
-                yield Recording(token, self.version, frames, keys)
+                name_of = nuscenes_can_bus.scene_name if self.can_bus else scene_name
+                yield Recording(token, self.version, frames, keys, name_of)
 
     def _add_world(
         self,
@@ -188,6 +246,9 @@ class NuScenes(base.ExporterBase):
         image_files.link_or_copy(frame.shard_dir / self.type / file, dataset_dir / file)
         for table, row in nuscenes_tables.world_rows(token, frame, file):
             tables.add(table, row)
+            if self.map_expansion and table == "log":
+                source = frame.shard_dir / self.type / expansion_file(frame.row["scene"])
+                image_files.link_or_copy(source, dataset_dir / expansion_file(row["location"]))
 
     def _link_files(self, info: DatasetInfo, recording: Recording, dataset_dir: Path) -> None:
         for frame, channel, target in recording.files():
@@ -198,6 +259,17 @@ class NuScenes(base.ExporterBase):
         for frame, table, target in recording.point_label_files():
             source = label_path(frame.shard_dir, table, frame.index)
             image_files.link_or_copy(source, dataset_dir / target)
+
+
+def _write_can_bus(recording: Recording, shard_dirs: Sequence[Path], folder: Path) -> None:
+    """Write the messages of a sequence, one file per kind."""
+    here = {frame.shard_dir for frame in recording.frames}
+    rows = fragments.fragment_rows([d for d in shard_dirs if d in here], "nuscenes", CAN_BUS)
+    lines = [row["messages"] for _, row in rows if row["sequence"] == recording.number]
+    for kind in nuscenes_can_bus.RATES_HZ:
+        messages = [message for line in lines for message in line[kind]]
+        stamped = nuscenes_can_bus.stamped(messages, recording.time_us)
+        write_json(folder / f"{recording.name}_{kind}.json", list(stamped))
 
 
 def _channel_name(prefix: str, sensor: str) -> str:

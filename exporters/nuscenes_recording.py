@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from gen_data.exporters.nuscenes_tables import Row, Tokens
@@ -31,12 +31,14 @@ class Recording:
         version: Name of the folder of the tables.
         frames: All its instants, in order.
         keys: Positions of the key frames in ``frames``; at least one.
+        name_of: Name of a scene by the number of its sequence.
     """
 
     token: Tokens
     version: str
     frames: Sequence[Frame]
     keys: Sequence[int]
+    name_of: Callable[[int], str] = scene_name
 
     @property
     def number(self) -> int:
@@ -46,7 +48,7 @@ class Recording:
     @property
     def name(self) -> str:
         """Name of the scene."""
-        return scene_name(self.number)
+        return self.name_of(self.number)
 
     def rows(self) -> Iterator[tuple[str, Row]]:
         """Yield all rows, each with its table; sensors' calibrations may repeat."""
@@ -58,7 +60,7 @@ class Recording:
                 "sample",
                 {
                     "token": self._sample_token(k),
-                    "timestamp": self._time_us(row["readings"][LIDAR_TOP]["time_s"]),
+                    "timestamp": self.time_us(row["readings"][LIDAR_TOP]["time_s"]),
                     "scene_token": self.token("scene", self.number),
                     "prev": around[0],
                     "next": around[1],
@@ -103,7 +105,8 @@ class Recording:
             return ""
         return self.token("sample", self.frames[self.keys[k]].index)
 
-    def _time_us(self, time_s: float) -> int:
+    def time_us(self, time_s: float) -> int:
+        """Time stamp of an instant of the sequence [us]."""
         info = self.token.info
         whole_s = math.ceil(info.steps_per_scene * info.step_s)
         start_us = START_US + PAUSE_US + self.number * (whole_s * 1_000_000 + PAUSE_US)
@@ -117,8 +120,8 @@ class Recording:
             reading = frame.row["readings"][channel]
             following = min(bisect_left(self.keys, k), len(self.keys) - 1)
             is_key = self.keys[following] == k
-            time_us = self._time_us(reading["time_s"])
-            ego_pose = {"token": tokens[n], "timestamp": time_us, **reading["ego"]}
+            stamp_us = self.time_us(reading["time_s"])
+            ego_pose = {"token": tokens[n], "timestamp": stamp_us, **reading["ego"]}
             calibrated = {
                 "sensor_token": self.token("sensor", channel),
                 "camera_intrinsic": reading["intrinsic"],
@@ -134,7 +137,7 @@ class Recording:
                     "sample_token": self._sample_token(following),
                     "ego_pose_token": ego_pose["token"],
                     "calibrated_sensor_token": calibrated["token"],
-                    "timestamp": time_us,
+                    "timestamp": stamp_us,
                     "fileformat": FILE_FORMATS[reading["suffix"]],
                     "is_key_frame": is_key,
                     "width": reading["size_px"][0],

@@ -2,20 +2,37 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.capture import Channel as ImageChannel
-from gen_data.core.interfaces import DatasetInfo, table_path
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo, table_path
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import SE3
-from gen_data.exporters import measurement_tables, nuscenes_files, nuscenes_frames
+from gen_data.exporters import (
+    measurement_tables,
+    nuscenes_can_bus,
+    nuscenes_files,
+    nuscenes_frames,
+    nuscenes_map,
+)
 from gen_data.exporters.nuscenes_classes import attribute_of, point_classes
 from gen_data.exporters.nuscenes_recording import LIDAR_TOP
+from gen_data.exporters.nuscenes_tables import Tokens
 from gen_data.exporters.point_cloud_io import read_points, scanner_at_sweep
+from gen_data.exporters.road_map import road_map
 from gen_data.exporters.sensor_selection import has_scans, instant_s
-from gen_data.exporters.sequences import Mount, frame_facts, relative_pose, write_bytes
+from gen_data.exporters.sequences import (
+    Mount,
+    frame_facts,
+    relative_pose,
+    sequence_number,
+    write_bytes,
+    write_json,
+)
 
 FOLDER = "nuscenes"
 _LABEL_SUFFIXES = {"lidarseg": ".bin", "panoptic": ".npz"}
@@ -48,6 +65,11 @@ def map_file(world: int) -> str:
     return f"maps/{world:06d}.png"
 
 
+def expansion_file(name: object) -> str:
+    """Path of a map expansion: of a location in the data set, of a world in a shard."""
+    return f"maps/expansion/{name}.json"
+
+
 @dataclass(frozen=True, eq=False)
 class ShardWriter:
     """Writes the samples of one shard.
@@ -55,6 +77,7 @@ class ShardWriter:
     Attributes:
         channels: Exported sensors; the first one is LIDAR_TOP.
         boxes_at, box_margin_m: Fields of the exporter.
+        roads: Library for map expansions; None = they are not written.
     """
 
     info: DatasetInfo
@@ -62,6 +85,7 @@ class ShardWriter:
     shard_dir: Path
     boxes_at: Literal["pulse", "step"]
     box_margin_m: float
+    roads: AssetLibrary | None = None
     _areas: dict[int, nuscenes_files.MapArea] = field(default_factory=dict)
 
     def write(self, sample: Sample) -> dict[str, Any]:
@@ -92,6 +116,26 @@ class ShardWriter:
             "boxes": boxes,
         }
 
+    def can_messages(self, sample: Sample, assets: AssetLibrary) -> dict[str, Any]:
+        """Line of the ego's messages from a sample's instant to the next step's.
+
+        Raises:
+            ConfigError: the ego is not a vehicle.
+        """
+        scene = sample.scene
+        ego = nuscenes_frames.channel_mount(scene, self.channels[0]).rig
+        if ego.startswith("/") or not scene.rig(ego).body:
+            raise ConfigError(
+                "exporter 'nuscenes': can_bus needs a vehicle that carries "
+                f"'{self.channels[0].sensor}'; add an element 'ego' and mount the sensor on its rig"
+            )
+        span_s = (scene.time_s, scene.time_s + self.info.step_s)
+        T_global_world = self._write_map(sample).T_global_world
+        return {
+            "sequence": sequence_number(self.info, sample.index),
+            "messages": nuscenes_can_bus.can_messages(scene, ego, span_s, T_global_world, assets),
+        }
+
     def _has_reading(self, sample: Sample, channel: nuscenes_frames.Channel) -> bool:
         if channel.modality == "camera":
             return channel.sensor in sample.truth
@@ -106,6 +150,12 @@ class ShardWriter:
             area = self._areas[world] = nuscenes_files.map_area(sample.scene.lanes)
             path = self.shard_dir / FOLDER / map_file(world)
             write_bytes(path, nuscenes_files.map_bytes(sample.scene.lanes, area))
+            if self.roads is not None:
+                token = partial(_map_token, Tokens(self.info), world)
+                expansion = nuscenes_map.map_expansion(
+                    road_map(sample.scene, self.roads), area, token
+                )
+                write_json(self.shard_dir / FOLDER / expansion_file(world), expansion)
         return self._areas[world]
 
     def _write_radar(
@@ -175,9 +225,12 @@ class ShardWriter:
         return thing.box(instant, self.box_margin_m)
 
 
+def _map_token(token: Tokens, world: int, layer: str, *identity: object) -> str:
+    return token(f"map.{layer}", world, *identity)
+
+
 def _ego_instance(sample: Sample, ego: str) -> int:
     """Instance id of the body that carries the ego's rig; 0 = none."""
-    if ego.startswith("/"):
-        return 0
     scene = sample.scene
-    return scene.body(scene.rig(ego).body).instance_id
+    body = "" if ego.startswith("/") else scene.rig(ego).body
+    return scene.body(body).instance_id if body else 0

@@ -81,8 +81,12 @@ def rig_motion(scene: Scene, mount: Mount) -> RigMotion:
     track = scene.track(rig.body) if rig else None
     if rig is None or track is None:
         return RigMotion(pose, STILL)
-    twist = track.twist(scene.time_s)
     origin_m = scene.body(rig.body).T_world_body.translation_m
+    return carried_motion(pose, origin_m, track.twist(scene.time_s))
+
+
+def carried_motion(pose: se3.SE3, origin_m: se3.Vec3, twist: Twist) -> RigMotion:
+    """Motion of a frame on a body whose origin has a twist: the lever arm's part is added."""
     arm_m = np.subtract(pose.translation_m, origin_m)
     turning = np.array(twist.angular_velocity_rad_s)
     swing_m_s = np.cross(turning, arm_m)

@@ -21,6 +21,7 @@ TABLE = PluginTable[AnyAnnotator](
         "bev_map": "gen_data.annotations.bev_map:BevMap",
         "boxes2d": "gen_data.annotations.boxes2d:Boxes2d",
         "boxes3d": "gen_data.annotations.boxes3d:Boxes3d",
+        "detectability": "gen_data.annotations.detectability:Detectability",
         "free_space": "gen_data.annotations.free_space:FreeSpace",
         "grasps": "gen_data.annotations.grasps:Grasps",
         "instance_masks": "gen_data.annotations.instance_masks:InstanceMasks",

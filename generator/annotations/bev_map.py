@@ -11,7 +11,6 @@ from pydantic import Field
 
 from gen_data.annotations.bev_raster import (
     Grid,
-    carriageways,
     covered_cells,
     footprints,
     ribbon,
@@ -20,6 +19,7 @@ from gen_data.annotations.bev_raster import (
 from gen_data.config.base_model import Strict
 from gen_data.core import capture, errors, interfaces, lane_geometry, sample, se3
 from gen_data.core.scene import Body, Instance, Scene
+from gen_data.roads.carriageway import carriageways
 
 LINE_PX = 1.5
 """Width of borders: wide enough that rasterised lines have no gaps."""

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.lane_geometry import border_line
-from gen_data.core.scene import Body, Lane, Scene
+from gen_data.core.scene import Body, Lane
 from gen_data.core.se3 import SE3, Array
+from gen_data.roads.carriageway import NOTHING
 
 Float32 = NDArray[np.float32]
 
@@ -120,39 +121,10 @@ def plane_slopes(corners: Array) -> Array:
     return np.stack([along_rows, along_columns], axis=1)
 
 
-CARRIAGEWAY = frozenset({"asphalt", "marking"})
-"""Roles of materials of drivable surfaces."""
 LOW_M = 2.0
 """Geometry higher than this above the ground, as crowns of trees, does not occupy it."""
 DIRECTIONS = 48
 """Directions that sample the outline of a footprint."""
-NOTHING: Array = np.zeros((0, 3, 3))
-
-
-def carriageways(scene: Scene, assets: AssetLibrary) -> Array:
-    """Triangles [n, 3, 3] of all drivable surfaces."""
-    parts = [
-        carriageway(body, assets)
-        for body in scene.bodies
-        if body.instance_id == 0 and body.motion == "static"
-    ]
-    return np.concatenate([NOTHING, *parts])
-
-
-@lru_cache(maxsize=32)
-def carriageway(body: Body, assets: AssetLibrary) -> Array:
-    """Upward triangles [n, 3, 3] of a body's carriageway; [0, 3, 3] for most bodies."""
-    materials = body.materials or assets.materials(body.asset)
-    slots = [k for k, material in enumerate(materials) if material.role in CARRIAGEWAY]
-    if not slots:
-        return NOTHING
-    mesh = assets.mesh(body.asset)
-    faces = mesh.faces[np.isin(mesh.face_slots, slots)]
-    vertices = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
-    triangles: Array = vertices[faces]
-    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    up = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0.0
-    return triangles[up]
 
 
 def strips(lanes: Iterable[Lane]) -> Array:

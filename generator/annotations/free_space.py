@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.annotations.bev_raster import Float32, Grid, carriageway, heights_m
+from gen_data.annotations.bev_raster import Float32, Grid, heights_m
 from gen_data.config.base_model import Strict
 from gen_data.core import boxes, rolling_shutter_projection, se3
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.sample import ImageTruth, MaskPx
 from gen_data.core.scene import Body, Scene
+from gen_data.roads.carriageway import carriageway
 
 TILE_M = 16.0
 """Grids are centred on multiples of this, so that the cameras of a rig share one."""

@@ -12,15 +12,15 @@ from gen_data.config.base_model import Strict
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.lane_geometry import LaneBorder, lane_borders
-from gen_data.core.rolling_shutter_projection import project_rolling_shutter
+from gen_data.core.lane_projection import project_border
 from gen_data.core.sample import BorderTruth, EgoTruth, ImageTruth
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 
-FINE_M = 0.1
-"""Borders are sampled at this step before they are thinned."""
 OCCLUDER_MIN_M = 0.15
 """Hits less than this above the ground hide no border: kerbs, wet leaves, rounding."""
+NEARER = 0.9
+"""Hits nearer than this part of the distance hide a border, however low they are."""
 
 
 class Lanes(Strict):
@@ -60,14 +60,9 @@ class Lanes(Strict):
     def _project_border(
         self, border: LaneBorder, scene: Scene, reading: SensorReading
     ) -> Iterator[BorderTruth]:
-        camera = reading.camera
-        lens = camera.intrinsics
-        p_world = resample_line(np.asarray(border.points_m), FINE_M)
-        p_camera = camera.T_world_camera.inverse().apply(p_world)
+        lens = reading.camera.intrinsics
+        p_camera, uv = project_border(scene, reading.camera, border)
         near = (p_camera * p_camera).sum(axis=1) < self.far_m**2
-        uv = lens.project(p_camera)
-        if camera.shutter.rolls:
-            p_camera, uv = project_rolling_shutter(scene, camera, p_world)
         # NaN, outside the lens's field, compares as False.
         inside = near & (uv >= 0.0).all(axis=1)
         inside &= (uv[:, 0] < lens.width_px) & (uv[:, 1] < lens.height_px)
@@ -82,14 +77,6 @@ class Lanes(Strict):
                 tuple((round(float(u), 2), round(float(v), 2)) for u, v in uv[rows]),
                 tuple(bool(seen) for seen in visible),
             )
-
-
-def resample_line(line_m: Array, step_m: float) -> Array:
-    """Points [n, 3] along a line at equal distances of at most a step, including both ends."""
-    lengths = np.sqrt((np.diff(line_m, axis=0) ** 2).sum(axis=1))
-    at_m = np.concatenate([[0.0], np.cumsum(lengths)])
-    even = np.linspace(0.0, at_m[-1], int(at_m[-1] / step_m) + 2)
-    return np.stack([np.interp(even, at_m, line_m[:, k]) for k in range(3)], axis=1)
 
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -109,11 +96,20 @@ def thin_line(uv: Array, step_px: float) -> NDArray[np.intp]:
 def is_seen(reading: SensorReading, p_camera: Array, uv: Array) -> NDArray[np.bool_]:
     """Whether points on the ground, [n, 3] in the camera frame, are visible, bool [n].
 
-    They are unless objects on the ground occlude them. ``uv`` are their image coordinates, [n, 2].
+    They are unless objects on the ground or crests occlude them. ``uv`` are their image
+    coordinates, [n, 2].
     """
+    ranges_m = reading.channels[Channel.RANGE]
+    height, width = ranges_m.shape
     columns, rows = (uv[:, k].astype(np.intp) for k in (0, 1))
-    range_m = reading.channels[Channel.RANGE][rows, columns].astype(np.float64)
+    range_m = ranges_m[rows, columns].astype(np.float64)
     away_m = np.sqrt((p_camera * p_camera).sum(axis=1))
     first_hit = p_camera * (np.minimum(range_m, away_m) / away_m)[:, None]
     above_m = reading.camera.T_world_camera.rotate(first_hit - p_camera)[:, 2]
-    return np.asarray(above_m < OCCLUDER_MIN_M)
+    # On hills, occluders may be lower than the point: they are much nearer, around the pixel, too.
+    beyond_m = np.zeros(len(uv))
+    for down in (-1, 0, 1):
+        for right in (-1, 0, 1):
+            near = np.clip(rows + down, 0, height - 1), np.clip(columns + right, 0, width - 1)
+            beyond_m = np.maximum(beyond_m, ranges_m[near])
+    return np.asarray((above_m < OCCLUDER_MIN_M) & (beyond_m > NEARER * away_m))

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from gen_data.annotations.instance_extents import crop
 from gen_data.core import errors, motion, se3
+from gen_data.core.asset_types import LAYER_MATERIALS
 from gen_data.core.boxes import BoxPx, OrientedBox, tight_box
-from gen_data.core.capture import Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.capture import LAYERS, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import EgoTruth, ImageTruth, MaskPx, ObjectTruth, Relation, Sample
 from gen_data.core.scene import Instance, Scene
@@ -31,10 +32,20 @@ NOT_NEGATIVE = frozenset(
         Channel.MEASURED_DEPTH,
         Channel.DISPARITY,
         Channel.DISPARITY_VISIBLE,
+        Channel.DEPTH_LAYERS,
     }
 )
-MAY_BE_INFINITE = frozenset({Channel.Z_DEPTH, Channel.RANGE, Channel.MEASURED_DEPTH})
-MAY_BE_NAN = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD, Channel.SCENE_FLOW})
+MAY_BE_INFINITE = frozenset(
+    {Channel.Z_DEPTH, Channel.RANGE, Channel.MEASURED_DEPTH, Channel.DEPTH_LAYERS}
+)
+MAY_BE_NAN = frozenset(
+    {
+        Channel.FLOW_FORWARD,
+        Channel.FLOW_BACKWARD,
+        Channel.SCENE_FLOW,
+        Channel.MIRRORED_POSITION,
+    }
+)
 
 Fault = tuple[str, str]
 """Field, and what is wrong with it."""
@@ -107,12 +118,16 @@ def _reading_faults(info: DatasetInfo, name: str, reading: SensorReading) -> Ite
             yield field, "is missing"
             continue
         image = reading.channels[channel]
-        if image.shape[:2] != size:
+        if channel in LAYERS and image.ndim != 3:
+            yield field, f"has the shape {image.shape}; expected [height, width, layers]"
+        elif image.shape[:2] != size:
             yield field, f"has {image.shape[:2]} pixels (height, width); expected {size}"
         elif image.dtype.kind == "f":
             yield from _value_faults(field, channel, image)
         elif channel is Channel.CATEGORY and int(image.max(initial=0)) > len(info.categories):
             yield field, f"shows category {image.max()} of {len(info.categories)}"
+        elif channel is Channel.MATERIAL_LAYERS and image.max(initial=0) >= len(LAYER_MATERIALS):
+            yield field, f"shows material {image.max()} of {len(LAYER_MATERIALS) - 1}"
 
 
 def _value_faults(field: str, channel: Channel, image: NDArray[np.floating]) -> Iterator[Fault]:
@@ -142,12 +157,16 @@ def _image_faults(
         yield "camera", f"its pose is not rigid: {truth.camera.T_world_camera}"
         return
     instances = {i.instance_id: i for i in scene.instances}
-    shown = None
-    if Channel.INSTANCE in reading.channels:
-        shown = _count_ids(reading.channels[Channel.INSTANCE])
-        foreign = sorted(set(np.flatnonzero(shown).tolist()) - {0, *instances})
+    counts = {
+        channel: _count_ids(reading.channels[channel])
+        for channel in (Channel.INSTANCE, Channel.INSTANCE_LAYERS, Channel.SEEN_IN_MIRROR)
+        if channel in reading.channels
+    }
+    for count in counts.values():
+        foreign = sorted(set(np.flatnonzero(count).tolist()) - {0, *instances})
         if foreign:
             yield "image", f"shows instance {foreign[0]}, which the scene does not have"
+    shown = counts.get(Channel.INSTANCE)
     ids = [item.instance.instance_id for item in truth.objects]
     if ids != sorted(set(ids)):
         yield "objects", f"are not in ascending order of unique instance ids: {ids[:20]}"
@@ -297,6 +316,8 @@ def _share_faults(item: ObjectTruth) -> Iterator[Fault]:
         # Written so that NaN is a fault.
         if share is not None and not 0.0 <= share <= 1.0:
             yield name, f"{share} is not in [0, 1]"
+    if item.detectability is not None and not 0.0 <= item.detectability < math.inf:
+        yield "detectability", f"{item.detectability} is no number from 0"
     if item.visible_fraction is not None and (item.visible_fraction > 0) != (item.visible_px > 0):
         yield "visible_fraction", f"{item.visible_fraction} with {item.visible_px} visible pixels"
     for name, count in (item.part_px or {}).items():

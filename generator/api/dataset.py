@@ -476,7 +476,7 @@ class StoredDataset(SampleSequence):
 def _parse_channels(names: Sequence[str]) -> frozenset[Channel]:
     from gen_data.core.capture import Channel
 
-    known = {channel.value: channel for channel in Channel if channel is not Channel.AMODAL}
+    known = {channel.value: channel for channel in Channel if channel.is_image}
     for name in names:
         if name not in known:
             raise errors.ConfigError(

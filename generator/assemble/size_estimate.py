@@ -17,6 +17,11 @@ BYTES_PER_PIXEL = {
     "object_coordinates": 0.6,
     "measured_depth": 0.9,
     "infrared": 1.2,
+    "depth_layers": 0.8,
+    "instance_layers": 0.1,
+    "material_layers": 0.1,
+    "seen_in_mirror": 0.01,
+    "mirrored_position": 0.3,
 }
 """Sizes of PNG files, measured on tabletop and street; other channels are taken as 1."""
 

@@ -154,7 +154,7 @@ def _samples(
 
 
 def _channel(name: str) -> capture.Channel:
-    shown = [c.value for c in capture.Channel if c is not capture.Channel.AMODAL]
+    shown = [c.value for c in capture.Channel if c.is_image]
     if name not in shown:
         raise ConfigError(
             f"--channels: unknown channel '{name}'; expected {WRITTEN}, or some of"

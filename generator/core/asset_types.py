@@ -70,6 +70,10 @@ SURFACES = (
 """Kinds of surfaces that a laser may hit, by index: fog and rain (``air``), a mirror image, or the
 role of a material; 0 = any other."""
 
+LAYER_MATERIALS = ("", "other", "see_through", "mirror", *SURFACES[2:-1])
+"""Materials in the channel MATERIAL_LAYERS, by number: see-through surfaces and mirrors by their
+optics, all others by their role; 0 = no surface."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MeshData:

@@ -1,5 +1,6 @@
 """Readings of sensors: images, point clouds and measurements."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -52,6 +53,7 @@ class Channel(str, Enum):
     CATEGORY              uint16 [h, w]           category id; 0
     OBJECT_COORDINATES    float32 [h, w, 3]       position in the instance's box, [0, 1]; 0
     AMODAL                (silhouettes)           each instance alone, also outside the image
+    SIGNAL                (expected signal)       a photograph before its noise; none without RGB
     MEASURED_DEPTH        float32 [h, w]          depth as a device reports it [m]; inf
     INFRARED              uint16 [h, w]           its image of its own light, in its own units; 0
     DISPARITY             float32 [h, w]          to the camera on the right [px]; 0
@@ -65,7 +67,20 @@ class Channel(str, Enum):
     SCENE_FLOW            float32 [h, w, 3]       where the seen point is a step later, in the
                                                   camera frame of then, minus where it is now, in
                                                   that of now [m]; NaN
+    DEPTH_LAYERS          float32 [h, w, k]       Z_DEPTH of the surfaces along a ray; inf
+    INSTANCE_LAYERS       uint16 [h, w, k]        their instance ids; 0
+    MATERIAL_LAYERS       uint16 [h, w, k]        their materials: numbers in
+                                                  ``asset_types.LAYER_MATERIALS``; 0
+    SEEN_IN_MIRROR        uint16 [h, w]           id of the instance that a mirror shows; 0
+    MIRRORED_POSITION     float32 [h, w, 3]       where the point is that a mirror shows, in the
+                                                  world frame [m]; NaN
     ====================  ======================  ==========================================
+
+    Layers are the surfaces that a straight ray meets up to the first one that nothing is seen
+    through, that one included: both sides of glass, but not the back of a box. The first layer is
+    Z_DEPTH or INSTANCE; there are as many as ``Camera.layers`` states. Mirrors are the mirrors of
+    LAYER_MATERIALS that a ray ends at, also behind glass, and show the first surface on the ray
+    that they reflect.
 
     A sky is at infinity and has the flow that the camera's rotation gives it; ``u + FLOW`` is the
     image of ``p + SCENE_FLOW``. Flow is NaN where the lens has no image of the point then, and
@@ -83,6 +98,7 @@ class Channel(str, Enum):
     CATEGORY = "category"
     OBJECT_COORDINATES = "object_coordinates"
     AMODAL = "amodal"
+    SIGNAL = "signal"
     MEASURED_DEPTH = "measured_depth"
     INFRARED = "infrared"
     DISPARITY = "disparity"
@@ -92,10 +108,39 @@ class Channel(str, Enum):
     FLOW_OCCLUDED_FORWARD = "flow_occluded_forward"
     FLOW_OCCLUDED_BACKWARD = "flow_occluded_backward"
     SCENE_FLOW = "scene_flow"
+    DEPTH_LAYERS = "depth_layers"
+    INSTANCE_LAYERS = "instance_layers"
+    MATERIAL_LAYERS = "material_layers"
+    SEEN_IN_MIRROR = "seen_in_mirror"
+    MIRRORED_POSITION = "mirrored_position"
 
     def __str__(self) -> str:
         """The name in YAML and of folders."""
         return self.value
+
+    @property
+    def is_image(self) -> bool:
+        """Whether it is one of ``SensorReading.channels``."""
+        return self not in (Channel.AMODAL, Channel.SIGNAL)
+
+
+LAYERS: Mapping[Channel, float] = {
+    Channel.DEPTH_LAYERS: math.inf,
+    Channel.INSTANCE_LAYERS: 0,
+    Channel.MATERIAL_LAYERS: 0,
+}
+"""Channels of several surfaces along each ray, with the value where there is no further one."""
+
+MIRRORED: Mapping[Channel, NDArray[Any]] = {
+    Channel.SEEN_IN_MIRROR: np.zeros((), np.uint16),
+    Channel.MIRRORED_POSITION: np.full(3, np.nan, np.float32),
+}
+"""Channels of what mirrors show, with the value of a pixel without a mirrored surface."""
+
+LAYERS_MAX = 8
+"""Largest number of layers."""
+LAYERS_USUAL = 4
+"""Layers of cameras that state no number: a drinking glass has four surfaces."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -117,6 +162,22 @@ class Silhouette:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class ExpectedSignal:
+    """What a photograph would be without noise, as its sensor reads it, and its noise.
+
+    Both are shares of saturation, float32 [h, w, c]: one value of a pixel behind a colour filter
+    (the pattern repeats after two pixels) or on a monochrome sensor, three of others.
+
+    Attributes:
+        mean: Of repeated photographs.
+        stddev: Of one photograph about the mean, the sensor's fixed pattern included.
+    """
+
+    mean: NDArray[np.float32]
+    stddev: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class SensorReading:
     """Reading of one camera.
 
@@ -126,6 +187,7 @@ class SensorReading:
         time_s: The instant that depth, ids and boxes refer to; with a rolling shutter, that of the
             image's middle row (see ``camera.shutter``).
         ev100: Exposure value that was set or metered; None without a photograph.
+        signal: Of the photograph; None without one, or unless SIGNAL was requested.
     """
 
     sensor: str
@@ -134,6 +196,7 @@ class SensorReading:
     silhouettes: Mapping[int, Silhouette] = field(default_factory=dict)
     time_s: float = 0.0
     ev100: float | None = None
+    signal: ExpectedSignal | None = None
 
 
 POINT = np.dtype(

@@ -17,6 +17,7 @@ EXTRAS = {
     "pxr": ("usd-core", "usd"),
     "pyarrow": ("pyarrow", "formats"),
     "rerun": ("rerun-sdk", "preview"),
+    "shapely": ("shapely", "formats"),
 }
 """Package and extra by the module that the package installs."""
 

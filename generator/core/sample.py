@@ -92,6 +92,8 @@ class ObjectTruth:
             (BOP's visib_fract) (visibility).
         occlusion: Share of the silhouette inside the image that other things hide (visibility).
         truncation: Share of the silhouette that lies outside the image (visibility).
+        detectability: Contrast of the visible pixels to the pixels around them over the noise:
+            d' of the ideal observer (detectability); None without a photograph too.
         part_px: Visible pixels per part name, for instances with parts (part_masks).
         keypoints: In the order of ``instance.keypoints``; empty if it has none (keypoints).
         lidar_points: Points of each laser scanner on the instance, by sensor; None without one.
@@ -114,6 +116,7 @@ class ObjectTruth:
     visible_fraction: float | None = None
     occlusion: float | None = None
     truncation: float | None = None
+    detectability: float | None = field(default=None, metadata={serialization.SPARSE: True})
     part_px: Mapping[str, int] | None = None
     keypoints: tuple[KeypointTruth, ...] | None = None
     lidar_points: Mapping[str, int] | None = None

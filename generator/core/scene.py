@@ -576,6 +576,7 @@ class Camera:
         rig: Name of the rig it is mounted on; empty = fixed in the world.
         T_rig_camera: Pose on the rig.
         shutter: Exposure of its rows around the scene's instant.
+        layers: Surfaces along each ray in channels of layers; 0 = as many as usual.
     """
 
     name: str
@@ -585,6 +586,7 @@ class Camera:
     rig: str = ""
     T_rig_camera: SE3 = IDENTITY
     shutter: Shutter = INSTANT
+    layers: int = field(default=0, metadata={serialization.SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)

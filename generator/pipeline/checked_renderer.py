@@ -15,7 +15,7 @@ from gen_data.core.capture import Channel, LidarHits, LidarRays, SensorReading
 from gen_data.core.errors import SampleError
 from gen_data.core.scene import Camera, Lidar, Scene
 
-DISTANCES = frozenset({Channel.Z_DEPTH, Channel.RANGE})
+DISTANCES = frozenset({Channel.Z_DEPTH, Channel.RANGE, Channel.DEPTH_LAYERS})
 """Channels with infinity for nothing."""
 
 

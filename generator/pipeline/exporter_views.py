@@ -238,7 +238,8 @@ class ExporterView:
                 if reading and self.rectify and not reading.camera.intrinsics.straight:
                     if not target.exists():
                         bent = rectification(reading.camera.intrinsics, self.rectify)
-                        image = read_image(source, channel, info.depth_scale_m)
+                        size_px = (bent.source.width_px, bent.source.height_px)
+                        image = read_image(source, channel, info.depth_scale_m, size_px)
                         encoding = info.encoding(name, channel)
                         data = encode_channel(
                             channel, bent.image(channel, image), info.depth_scale_m, encoding

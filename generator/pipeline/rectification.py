@@ -25,7 +25,7 @@ from gen_data.annotations.part_masks import PartMasks
 from gen_data.annotations.visibility import Visibility
 from gen_data.core import errors, lens, se3
 from gen_data.core.boxes import BoxPx, tight_box
-from gen_data.core.capture import Channel, SensorReading, Silhouette
+from gen_data.core.capture import LAYERS, Channel, SensorReading, Silhouette
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import (
     TRACK_STATES,
@@ -55,6 +55,9 @@ NOTHING: Mapping[Channel, float] = {
     Channel.CATEGORY: 0,
     Channel.OBJECT_COORDINATES: 0,
     Channel.SCENE_FLOW: np.nan,
+    Channel.SEEN_IN_MIRROR: 0,
+    Channel.MIRRORED_POSITION: np.nan,
+    **LAYERS,
 }
 """Channels that can be rectified, with the value of a pixel whose ray the original does not show.
 

@@ -11,7 +11,13 @@ import numpy as np
 
 from gen_data.core import capture, errors, plugins, whole_files
 from gen_data.core.sample import Sample, SensorTracks
-from gen_data.preview.overlay import Image, channel_image, draw_labels, draw_tracks
+from gen_data.preview.overlay import (
+    Image,
+    channel_image,
+    draw_labels,
+    draw_tracks,
+    layer_images,
+)
 from gen_data.preview.sensor_views import range_view, top_view
 from gen_data.preview.voxel_view import oblique_view
 from gen_data.sensors.lidar import pseudo_lidar
@@ -39,7 +45,7 @@ def make_tiles(
     views: Mapping[str, str] = MappingProxyType({}),
     width_px: int = 0,
 ) -> Iterator[Tile]:
-    """Yield one tile per sample, camera and channel, two per scan, and one of its occupancy.
+    """Yield a tile per sample, camera and channel or layer, two per scan, one of the occupancy.
 
     Tracked points are drawn with their ways through the samples of the sequence that are shown.
 
@@ -62,9 +68,10 @@ def make_tiles(
                 if labels and channel is capture.Channel.RGB:
                     unit = reading.camera.intrinsics.width_px / width_px if width_px else 1.0
                     image = draw_labels(reading, sample.truth[name], unit)
-                    if name in ways.seen:
-                        draw_tracks(image, ways.seen[name], unit)
-                    yield Tile(caption, image)
+                    yield Tile(caption, ways.drawn(image, name, unit))
+                elif channel in capture.LAYERS:
+                    for number, image in enumerate(layer_images(reading, channel)):
+                        yield Tile(f"{name} {channel.value} {number}", image)
                 else:
                     yield Tile(caption, channel_image(reading, channel))
         for name, cloud in sorted(sample.capture.clouds.items()):
@@ -96,6 +103,12 @@ class _Ways:
         if sample.frame is not None and sample.frame.tracks is not None:
             for name, tracks in sample.frame.tracks.sensors.items():
                 self.seen.setdefault(name, []).append(tracks)
+
+    def drawn(self, image: Image, sensor: str, unit: float) -> Image:
+        """The image of a sensor, in which its points are drawn if it has any."""
+        if sensor in self.seen:
+            draw_tracks(image, self.seen[sensor], unit)
+        return image
 
 
 def render_tiles(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:

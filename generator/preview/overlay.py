@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import boxes, sample, skeletons
+from gen_data.core import boxes, capture, sample, skeletons
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.preview.palette import (
@@ -16,6 +16,7 @@ from gen_data.preview.palette import (
     color_depth,
     color_flow,
     color_ids,
+    color_positions,
     grey_infrared,
     id_color,
 )
@@ -87,13 +88,20 @@ def draw_labels(
 
 
 def channel_image(reading: SensorReading, channel: Channel) -> Image:
-    """Convert any channel to a visible image, uint8 [h, w, 3].
+    """Convert any channel to a visible image, uint8 [h, w, 3]; layers are side by side.
 
     Raises:
         KeyError: the reading does not have the channel.
     """
     image = reading.channels[channel]
+    if channel in capture.LAYERS:
+        image = np.concatenate(np.moveaxis(image, -1, 0), axis=1)
     return _SHOWN[channel](image) if channel in _SHOWN else color_ids(image)
+
+
+def layer_images(reading: SensorReading, channel: Channel) -> list[Image]:
+    """The visible image of each layer of a channel, in colours that are the same in all of them."""
+    return np.split(channel_image(reading, channel), reading.channels[channel].shape[-1], axis=1)
 
 
 def _disparity(disparity_px: NDArray[Any]) -> Image:
@@ -115,11 +123,13 @@ _SHOWN: Mapping[Channel, Callable[[NDArray[Any]], Image]] = {
     Channel.Z_DEPTH: color_depth,
     Channel.RANGE: color_depth,
     Channel.MEASURED_DEPTH: color_depth,
+    Channel.DEPTH_LAYERS: color_depth,
     Channel.DISPARITY: _disparity,
     Channel.DISPARITY_VISIBLE: _disparity,
     Channel.INFRARED: grey_infrared,
     Channel.NORMALS: lambda normals: np.round((normals + 1.0) * 127.5).astype(np.uint8),
     Channel.OBJECT_COORDINATES: lambda places: np.round(places * 255.0).astype(np.uint8),
+    Channel.MIRRORED_POSITION: color_positions,
     Channel.FLOW_FORWARD: color_flow,
     Channel.FLOW_BACKWARD: color_flow,
     Channel.SCENE_FLOW: _flow_from_above,
@@ -255,10 +265,16 @@ def _outline(image: Image, item: sample.ObjectTruth, width: int) -> None:
     window[edge] = id_color(item.instance.instance_id)
 
 
+def title(item: sample.ObjectTruth) -> str:
+    """The category of an object, with its d' where that is annotated."""
+    index = "" if item.detectability is None else f" d'={item.detectability:.0f}"
+    return f"{item.instance.category}{index}"
+
+
 def _write(image: Image, item: sample.ObjectTruth, unit: float, places: list[boxes.BoxPx]) -> None:
     """Write the category of an object above its box, below the names at the same place."""
     assert item.box is not None
-    text, size, pen = item.instance.category, FONT_SIZE * unit, max(1, round(unit))
+    text, size, pen = title(item), FONT_SIZE * unit, max(1, round(unit))
     (width, height), base = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, pen)
     pad = max(1, round(2 * unit))
     width, height = width + 2 * pad, height + base // 2 + 2 * pad

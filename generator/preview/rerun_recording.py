@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gen_data.core import asset_types, errors, interfaces, intrinsics, se3, skeletons, whole_files
 from gen_data.core.boxes import OrientedBox
-from gen_data.core.capture import Channel, PointCloud, SensorReading
+from gen_data.core.capture import LAYERS, Channel, PointCloud, SensorReading
 from gen_data.core.sample import TRACK_STATES, ImageTruth, Occupancy, Sample, SensorTracks
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.preview import overlay, palette, sensor_views, voxel_view
@@ -25,7 +25,7 @@ from gen_data.preview import overlay, palette, sensor_views, voxel_view
 TIMELINE = "sample"
 TIME = "time"
 APPLICATION = "gen-data"
-IN_IMAGE = {Channel.RGB, Channel.Z_DEPTH, Channel.MEASURED_DEPTH}
+IN_IMAGE = {Channel.RGB, Channel.Z_DEPTH, Channel.MEASURED_DEPTH, Channel.DEPTH_LAYERS}
 """Channels that are overlaid in one view; each other channel has its own view."""
 AXES_M = 0.5
 """Length of the axes of rigs and devices."""
@@ -197,6 +197,15 @@ class Recorder:
             elif channel in (Channel.Z_DEPTH, Channel.MEASURED_DEPTH):
                 shown = np.where(np.isfinite(data), data, 0).astype(np.float32)
                 self.stream.log(f"{path}/image/{channel.value}", rr.DepthImage(shown, meter=1.0))
+            elif channel is Channel.DEPTH_LAYERS:
+                for number, layer_m in enumerate(np.moveaxis(data, -1, 0)):
+                    shown = np.where(np.isfinite(layer_m), layer_m, 0).astype(np.float32)
+                    layer = f"{path}/image/{channel.value}/{number}"
+                    self.stream.log(layer, rr.DepthImage(shown, meter=1.0))
+            elif channel in LAYERS:
+                for number, image in enumerate(overlay.layer_images(reading, channel)):
+                    layer = f"channels/{name}/{channel.value}/{number}"
+                    self.stream.log(layer, rr.Image(image).compress(90))
             elif channel is Channel.CATEGORY:
                 self.stream.log(f"channels/{name}/category", rr.SegmentationImage(data))
             else:
@@ -279,7 +288,7 @@ def _record_all(recorder: Recorder, samples: Iterable[Sample]) -> None:
 
 def _layout(info: interfaces.DatasetInfo, first: Sample) -> rrb.Blueprint:
     world = rrb.Spatial3DView(origin="world", name="scene", eye_controls=_eye(first))
-    cameras = rrb.Vertical(*(_camera_view(info, name) for name in info.cameras))
+    cameras = rrb.Vertical(*(_camera_view(info, name, first) for name in info.cameras))
     return rrb.Blueprint(rrb.Horizontal(world, cameras), collapse_panels=True)
 
 
@@ -293,14 +302,25 @@ def _eye(sample: Sample) -> rrb.EyeControls3D | None:
     return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
 
 
-def _camera_view(info: interfaces.DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
+def _camera_view(
+    info: interfaces.DatasetInfo, name: str, first: Sample
+) -> rrb.Spatial2DView | rrb.Tabs:
     image = rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name)
+    reading = first.capture.readings.get(name)
     others = [
-        rrb.Spatial2DView(origin=f"channels/{name}/{c.value}", name=f"{name} {c.value}")
-        for c in info.media.get(name, ())
-        if c not in IN_IMAGE
+        rrb.Spatial2DView(origin=f"channels/{name}/{view}", name=f"{name} {view}")
+        for channel in info.media.get(name, ())
+        if channel not in IN_IMAGE
+        for view in _views_of(channel, reading)
     ]
     return rrb.Tabs(image, *others) if others else image
+
+
+def _views_of(channel: Channel, reading: SensorReading | None) -> list[str]:
+    """Names of the views of a channel: one, or one of each layer."""
+    if channel not in LAYERS or reading is None:
+        return [channel.value]
+    return [f"{channel.value}/{layer}" for layer in range(reading.channels[channel].shape[-1])]
 
 
 def transform(pose: se3.SE3, scale: float = 1.0) -> rr.Transform3D:
@@ -377,7 +397,7 @@ def boxes_2d(truth: ImageTruth) -> rr.Boxes2D:
     return rr.Boxes2D(
         mins=[(item.box.x_min, item.box.y_min) for item in items if item.box],
         sizes=[(item.box.width_px, item.box.height_px) for item in items if item.box],
-        labels=[item.instance.category for item in items],
+        labels=[overlay.title(item) for item in items],
         class_ids=[item.instance.category_id for item in items],
     )
 

@@ -14,6 +14,7 @@ from typing import Any
 from gen_data.annotations.annotate import Thresholds
 from gen_data.config.data_files import load_data
 from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.core.asset_types import LAYER_MATERIALS
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
 from gen_data.core.markdown import plain
@@ -233,7 +234,8 @@ def _meaning(info: DatasetInfo, key: str) -> str:
     """Meaning of a channel's pixels, or of the files of a modality."""
     texts = _meanings()
     text = texts["channels"].get(key) or texts.get(key) or key
-    return str(text).replace("{scale}", f"{info.depth_scale_m:g}")
+    materials = ", ".join(f"{k} {name}" for k, name in enumerate(LAYER_MATERIALS) if name)
+    return str(text).replace("{scale}", f"{info.depth_scale_m:g}").replace("{materials}", materials)
 
 
 @cache

@@ -39,6 +39,7 @@ BYTES_DEPEND_ON = {
     "pyoidn": "pyoidn",
     "rerun": "rerun-sdk",
     "scipy": "scipy",
+    "shapely": "shapely",
     "trimesh": "trimesh",
     "warp": "warp-lang",
 }

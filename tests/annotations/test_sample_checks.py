@@ -11,7 +11,16 @@ import pytest
 
 from gen_data.annotations.sample_checks import check_sample, sample_faults
 from gen_data.core.boxes import BoxPx, OrientedBox
-from gen_data.core.capture import POINT, Capture, Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.capture import (
+    LAYERS,
+    MIRRORED,
+    POINT,
+    Capture,
+    Channel,
+    Measurements,
+    PointCloud,
+    SensorReading,
+)
 from gen_data.core.errors import SampleError
 from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
@@ -30,7 +39,10 @@ from gen_data.core.se3 import SE3, look_at
 
 WIDTH_PX, HEIGHT_PX = 640, 480
 CATEGORIES = ("book", "bowl", "mug")
-CHANNELS = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.NORMALS, Channel.FLOW_FORWARD)
+CHANNELS = (
+    Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.NORMALS, Channel.FLOW_FORWARD,
+    *LAYERS, *MIRRORED,
+)  # fmt: skip
 NAN, INF = math.nan, math.inf
 
 
@@ -94,6 +106,11 @@ def make_sample() -> Sample:
         Channel.INSTANCE: ids,
         Channel.NORMALS: np.zeros((HEIGHT_PX, WIDTH_PX, 3), np.float32),
         Channel.FLOW_FORWARD: flow,
+        Channel.DEPTH_LAYERS: np.stack([np.where(ids > 0, 2.5, INF)] * 2, -1).astype(np.float32),
+        Channel.INSTANCE_LAYERS: np.stack([ids, 0 * ids], axis=-1),
+        Channel.SEEN_IN_MIRROR: 0 * ids,
+        Channel.MIRRORED_POSITION: np.full((HEIGHT_PX, WIDTH_PX, 3), NAN, np.float32),
+        Channel.MATERIAL_LAYERS: np.stack([ids > 0, 0 * ids], axis=-1).astype(np.uint16),
     }
     boxes = {"ego": {item.instance.instance_id: item.box3d_world for item in objects}}
     return Sample(
@@ -277,6 +294,12 @@ MUTATIONS: dict[str, Mutation] = {
     "normal infinite": change_pixel(Channel.NORMALS, INF),
     "flow infinite": change_pixel(Channel.FLOW_FORWARD, INF),
     "id of nothing": change_pixel(Channel.INSTANCE, 99),
+    "layer NaN": change_pixel(Channel.DEPTH_LAYERS, NAN),
+    "layer negative": change_pixel(Channel.DEPTH_LAYERS, -1.0),
+    "layer of nothing": change_pixel(Channel.INSTANCE_LAYERS, 99),
+    "material of nothing": change_pixel(Channel.MATERIAL_LAYERS, 99),
+    "mirrored instance unknown": change_pixel(Channel.SEEN_IN_MIRROR, 99),
+    "mirrored position infinite": change_pixel(Channel.MIRRORED_POSITION, INF),
     "points NaN": change_points("intensity", NAN),
     "points far": change_points("position_m", INF),
     "points of nothing": change_points("instance_id", 99),

@@ -516,10 +516,11 @@ def export(
     shard_size: int = 3,
     backwards: bool = False,
     keep_arrays: bool = False,
+    assets: Any = None,
 ) -> Path:
     if exporter.type == "rerun":
         pytest.importorskip("rerun", reason=NO_RERUN)
-    exporter = exporter.with_assets(Props())
+    exporter = exporter.with_assets(assets or Props())
     shards = [list(samples[i : i + shard_size]) for i in range(0, len(samples), shard_size)]
     shard_dirs = [folder / f"shards/{k:06d}" for k in range(len(shards))]
     work = list(zip(shards, shard_dirs, strict=True))

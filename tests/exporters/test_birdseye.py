@@ -11,8 +11,9 @@ import pytest
 
 from gen_data.core.motion import Twist
 from gen_data.core.sample import BorderTruth, MaskPx, MotionTruth, Sample
-from gen_data.exporters.birdseye import Birdseye, columns_at
+from gen_data.exporters.birdseye import Birdseye
 from gen_data.exporters.coco import Coco
+from gen_data.exporters.lane_lines import columns_at
 from tests.exporters.label_readers import json_lines
 
 BORDER = BorderTruth(
@@ -63,8 +64,7 @@ def test_lanes_are_columns_at_tusimples_rows(world: Any, sample: Sample, tmp_pat
     assert row["lanes"] == [[-2] * 7 + [60.0, 70.0, 80.0, 80.0, 80.0]]
     assert row["borders"][0]["visible"] == [1, 1, 0]
     assert row["raw_file"] == "color/rgb/000000000.png"
-    short = replace(BORDER, points_px=((5.0, 12.0), (6.0, 18.0)), visible=(True, True))
-    assert columns_at(short, [0, 10, 20]) == [-2, -2, -2]
+    assert columns_at(np.array([(5.0, 12.0), (6.0, 18.0)]), [0, 10, 20]) == [-2, -2, -2]
 
 
 def test_coco_tells_motion_lanes_and_free_space(world: Any, sample: Sample, tmp_path: Path) -> None:

@@ -63,6 +63,15 @@ def test_scene_flow_is_in_units_of_depth_and_occlusion_is_white() -> None:
     assert np.array_equal(values, 255 * hidden)
 
 
+def test_mirrored_positions_are_in_eight_units_of_depth() -> None:
+    """A depth image of 0.1 mm reaches 6.5 m; positions reach 26 m to every side."""
+    places = np.random.default_rng(3).uniform(-26.0, 26.0, (H, W, 3)).astype(np.float32)
+    places[0, 0], places[0, 1, 2] = np.nan, 27.0
+    values = read(encode_channel(Channel.MIRRORED_POSITION, places, 0.0001)).astype(np.float64)
+    assert (values[0, :2] == 0).all()
+    assert np.abs((values[1:] - 32768.0) * 0.0008 - places[1:]).max() <= 0.0004 + 1e-6
+
+
 def test_coco_tells_how_long_and_when_rows_were_exposed(world: Any, tmp_path: Path) -> None:
     """Of cameras with a shutter; the images of others say nothing about it."""
     shutter = Shutter(0.008, -0.025)

@@ -3,6 +3,7 @@
 import json
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,22 @@ def test_containers_hold_the_street(dataset: Path, world: Any) -> None:
     with h5py.File(path) as file:
         assert file["colors"].compression == file["depth"].compression == "gzip"
         assert file["depth"].shuffle and not file["colors"].shuffle
+
+
+@pytest.mark.parametrize("container", CONTAINERS)
+def test_layers_are_a_last_axis(container: str, world: Any, tmp_path: Path) -> None:
+    sample = world.samples[0]
+    reading = sample.capture.readings["color"]
+    ids = reading.channels[Channel.INSTANCE]
+    layers = np.stack([ids, np.roll(ids, 1, axis=0), np.zeros_like(ids)], axis=-1)
+    images = {**reading.channels, Channel.INSTANCE_LAYERS: layers}
+    capture = replace(sample.capture, readings={"color": replace(reading, channels=images)})
+    info = world.info(1, media={"color": (*MEDIA, Channel.INSTANCE_LAYERS)})
+    folder = world.export(
+        Hdf5(container=container), info, [replace(sample, capture=capture)], tmp_path
+    )
+    (path,) = folder.rglob("0*")
+    np.testing.assert_array_equal(load(path)["instance_layers"], layers)
 
 
 @pytest.mark.parametrize("container", CONTAINERS)

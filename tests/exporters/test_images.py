@@ -14,9 +14,15 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError, SampleError
+from gen_data.core.errors import ConfigError, SampleError, StorageError
 from gen_data.core.interfaces import media_path
-from gen_data.exporters.image_files import depth_units, encode_channel, link_or_copy, write_media
+from gen_data.exporters.image_files import (
+    depth_units,
+    encode_channel,
+    link_or_copy,
+    read_image,
+    write_media,
+)
 
 H, W = 37, 53
 
@@ -81,6 +87,35 @@ def test_ids_are_16_bit_grey_up_to_the_largest(channel: Channel) -> None:
     small_mode, _ = read(encode_channel(channel, ids % 3, 1.0))
     assert mode == small_mode == "I;16"
     np.testing.assert_array_equal(pixels, ids)
+
+
+LAYERED = {
+    Channel.DEPTH_LAYERS: np.stack([DEPTH_M, np.full_like(DEPTH_M, 2.5), DEPTH_M + 0.5], axis=-1),
+    Channel.INSTANCE_LAYERS: np.arange(24, dtype=np.uint16).reshape(2, 4, 3),
+    Channel.MATERIAL_LAYERS: np.arange(24, dtype=np.uint16).reshape(2, 4, 3) % 7,
+}
+
+
+@pytest.mark.parametrize("channel", LAYERED)
+def test_layers_are_below_one_another_as_single_images_are(
+    channel: Channel, tmp_path: Path
+) -> None:
+    """Each layer has the pixels of its own depth or id image; reading gives all back."""
+    layers = LAYERED[channel]
+    alone = Channel.Z_DEPTH if channel is Channel.DEPTH_LAYERS else Channel.INSTANCE
+    data = encode_channel(channel, layers, 0.5)
+    mode, pixels = read(data)
+    assert (mode, pixels.shape) == ("I;16", (6, 4))
+    for k, part in enumerate(pixels.reshape(3, 2, 4)):
+        np.testing.assert_array_equal(part, read(encode_channel(alone, layers[..., k], 0.5))[1])
+
+    path = tmp_path / "layers.png"
+    path.write_bytes(data)
+    found = read_image(path, channel, 0.5, (4, 2))
+    assert (found.shape, found.dtype) == (layers.shape, layers.dtype)
+    np.testing.assert_array_equal(encode_channel(channel, found, 0.5), data)
+    with pytest.raises(StorageError, match=r"\[6, 4\]; expected uint16 \[4, 4\]"):
+        read_image(path, channel, 0.5, (4, 4))
 
 
 def test_depth_survives_the_file_to_half_a_unit(tmp_path: Path) -> None:

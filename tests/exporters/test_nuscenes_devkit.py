@@ -16,6 +16,9 @@ from gen_data.core.scene_time import place_sensors
 from gen_data.core.se3 import SE3
 from gen_data.exporters.nuscenes import NuScenes
 from gen_data.sensors.radar.radar_sensor import Radar
+from tests.exporters.drives import drive_info
+from tests.exporters.test_nuscenes_expansions import on_streets, streets
+from tests.libraries import library
 
 # The devkit and its dependencies are older than the NumPy and Matplotlib that they run with.
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
@@ -232,3 +235,74 @@ def test_the_lidarseg_evaluation_scores_the_labels_as_perfect(
     assert perfect == [1.0] * len(perfect) and len(perfect) > 1
     other = score(lambda labels: np.where(np.arange(len(labels)) % 3, labels, 1), "other")
     assert min(other) < 0.7
+
+
+@pytest.fixture(scope="module")
+def expanded(world: Any, samples: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    exporter = NuScenes(key_frame_s=0.1, map_expansion=True, can_bus=True)
+    drive, folder = on_streets(samples), tmp_path_factory.mktemp("expanded")
+    made: Path = world.export(exporter, drive_info(world), drive, folder, assets=library())
+    return made
+
+
+def test_the_map_api_renders_every_layer_and_finds_the_closest_lane(
+    expanded: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also the lanes that come next; the centre lines are those of the scene within 2 cm."""
+    import matplotlib as mpl
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    mpl.use("Agg")
+    from nuscenes.map_expansion import map_api
+
+    def patch(polygon: Any, **style: Any) -> PathPatch:
+        """A polygon; descartes 1.1 fails with Shapely 2."""
+        return PathPatch(Outline(np.asarray(polygon.exterior.coords)), **style)
+
+    monkeypatch.setattr(map_api.descartes, "PolygonPatch", patch)
+    (log, _) = json.loads((expanded / V / "log.json").read_text())
+    monkeypatch.setattr(map_api, "locations", [log["location"]])
+    roads = map_api.NuScenesMap(str(expanded), log["location"])
+
+    figure, axes = roads.render_layers(roads.non_geometric_layers, figsize=(4, 4))
+    drawn = len(axes.patches) + len(axes.lines)
+    assert drawn == sum(len(getattr(roads, name)) for name in roads.non_geometric_layers)
+    mpl.pyplot.close(figure)
+    lanes = {lane.name: lane for lane in streets().lanes}
+    low = np.array(log["world_origin"][:2])
+    for name in ("main/forward0", "main/forward1", "main/backward0", "arm1/backward1"):
+        line = np.array(lanes[name].center_m)[:, :2] + low
+        x, y = line[len(line) // 3]
+        found = roads.get_closest_lane(x + 0.4, y - 0.3, radius=3.0)
+        path = np.array(roads.discretize_lanes([found], 0.5)[found])
+        gaps = np.linalg.norm(path[:, None, :2] - line[None], axis=2)
+        assert gaps.min(axis=0).max() < 0.26, "every point of the lane is on the path"
+        ahead, left = (
+            line[-1] - line[0],
+            np.array([line[0, 1] - line[-1, 1], line[-1, 0] - line[0, 0]]),
+        )
+        aside = (path[:, :2] - line[0]) @ left / np.linalg.norm(ahead)
+        assert np.abs(aside).max() < 0.02
+        assert roads.record_on_point(x, y, "road_block")
+        following = roads.get_outgoing_lane_ids(found)
+        assert len(following) == len(lanes[name].successors)
+
+
+def test_the_can_bus_api_reads_poses_that_agree_with_the_tables(expanded: Path) -> None:
+    from nuscenes.can_bus.can_bus_api import NuScenesCanBus
+    from nuscenes.nuscenes import NuScenes
+
+    devkit, bus = NuScenes(V, str(expanded), verbose=False), NuScenesCanBus(str(expanded))
+    for scene in devkit.scene:
+        poses = {row["utime"]: row for row in bus.get_messages(scene["name"], "pose")}
+        for kind in ("ms_imu", "steeranglefeedback", "vehicle_monitor"):
+            assert len(bus.get_messages(scene["name"], kind)) > 0
+        sample = devkit.get("sample", scene["first_sample_token"])
+        for _ in range(scene["nbr_samples"]):
+            data = devkit.get("sample_data", sample["data"]["LIDAR_TOP"])
+            ego = devkit.get("ego_pose", data["ego_pose_token"])
+            pose = poses[ego["timestamp"]]
+            np.testing.assert_allclose(pose["pos"], ego["translation"], atol=1e-6)
+            np.testing.assert_allclose(pose["orientation"], ego["rotation"], atol=1e-6)
+            sample = devkit.get("sample", sample["next"]) if sample["next"] else sample

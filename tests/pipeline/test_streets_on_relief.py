@@ -15,14 +15,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gen_data.annotations.lanes import Lanes
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory, open_pipeline
 from gen_data.core import errors, lane_geometry, scene_time, se3, serialization
 from gen_data.core.capture import Channel
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
+from gen_data.exporters.lane_lines import PaintedWorlds, lane_lines, vehicle_pose
 from gen_data.pipeline import Pipeline
-from tests.embree import RayCaster
+from tests.embree import RayCaster, placed
 from tests.street_ground import Street, wheels_m
 from tests.streets import thin_street
 
@@ -219,6 +221,33 @@ def test_ground_of_hills_in_depth_images_is_where_rays_meet_it(
         assert off_m.max() < 0.006
         apart = np.abs(np.linalg.norm(seen, axis=1) / met_m[ground] - 1.0)
         assert (apart > 0.005).mean() < 0.002
+
+
+@pytest.mark.slow
+def test_borders_are_hidden_by_crests_and_by_cars_uphill_and_downhill(
+    hilly_samples: tuple[Pipeline, list[Sample]],
+) -> None:
+    """As rays to points just above and 30 cm above them are blocked."""
+    pipeline, samples = hilly_samples
+    wrong = hidden = 0
+    for sample in samples:
+        scene, reading = sample.scene, sample.capture.readings["color"]
+        caster = RayCaster(*(placed(b, pipeline.assets) for b in scene.bodies))
+        eye = np.array(reading.camera.T_world_camera.translation_m)
+        image = Lanes().annotate_image(scene, pipeline.assets, reading, sample.truth["color"])
+        dividers = PaintedWorlds(pipeline.assets).dividers(
+            replace(sample, truth={"color": image}), "color"
+        )
+        T_world_vehicle = reading.camera.T_world_camera @ vehicle_pose(scene, reading.camera)
+        for line in lane_lines(replace(sample, truth={"color": image}), "color", dividers):
+            points = T_world_vehicle.apply(line.points_m)
+            low, high = (
+                caster.is_blocked(eye, points + np.array((0.0, 0.0, above_m)) - eye, 0.0, 1.0)
+                for above_m in (0.02, 0.3)
+            )
+            wrong += int(((line.visible == low) & (low == high)).sum())
+            hidden += int((low & high).sum())
+    assert hidden > 4 and wrong == 0
 
 
 @pytest.mark.slow

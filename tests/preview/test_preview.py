@@ -196,6 +196,8 @@ def test_every_channel_of_a_camera_is_in_the_recording() -> None:
         Channel.INSTANCE: ids,
         Channel.NORMALS: np.zeros((4, 8, 3), np.float32),
         Channel.DISPARITY: depth_m,
+        Channel.DEPTH_LAYERS: np.stack([depth_m, depth_m + 1.0], axis=-1),
+        Channel.INSTANCE_LAYERS: np.stack([ids, ids + 1, 0 * ids], axis=-1),
     }
     stream = _Stream()
     recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
@@ -203,9 +205,10 @@ def test_every_channel_of_a_camera_is_in_the_recording() -> None:
     truth = {"color": ImageTruth(camera, ())}
     recorder.record(Sample(0, 0, 0, "train", Scene("s"), capture, truth))
     logged = {path for path, _ in stream.logged}
-    for name in ("rgb", "depth", "measured_depth"):
+    for name in ("rgb", "depth", "measured_depth", "depth_layers/0", "depth_layers/1"):
         assert f"world/cameras/color/image/{name}" in logged
-    for name in ("category", "instance", "normals", "disparity"):
+    layers = [f"instance_layers/{k}" for k in range(3)]
+    for name in ("category", "instance", "normals", "disparity", *layers):
         assert f"channels/color/{name}" in logged
 
 

@@ -50,6 +50,21 @@ def sample() -> Sample:
     return Sample(0, 0, 0, "train", scene, Capture(readings, tables=tables), truth)
 
 
+def test_layers_have_a_tile_each_in_the_same_colours() -> None:
+    """Near is bright: 1 m in the first layer, 2 m in the second, and black without a third."""
+    taken = sample()
+    reading = taken.capture.readings["color"]
+    depth_m = np.full((24, 32, 3), (1.0, 2.0, np.inf), np.float32)
+    images = {Channel.DEPTH_LAYERS: depth_m}
+    capture = Capture({"color": replace(reading, channels=images)})
+    shown = list(
+        make_tiles([replace(taken, capture=capture)], {"color": tuple(images)}, labels=False)
+    )
+    assert [t.caption for t in shown] == [f"color depth_layers {k}" for k in range(3)]
+    assert [t.image.shape for t in shown] == [(24, 32, 3)] * 3
+    assert [int(t.image.mean()) for t in shown] == [255, 40, 0]
+
+
 def test_every_sensor_shows_what_it_writes_and_captions_stand_below() -> None:
     """Captions name the sensor, and the channel where it has several."""
     channels = {"color": (Channel.RGB,), "depth": (Channel.RGB, Channel.Z_DEPTH)}

@@ -145,6 +145,42 @@ def test_things_and_ground_have_labels_and_the_rest_has_none() -> None:
     np.testing.assert_array_equal(known, np.isfinite(ours[Channel.RANGE]))
 
 
+def test_layers_behind_glass_have_labels_where_the_ground_has() -> None:
+    """Through two sides of a cube of glass above the ground, this inside its corners."""
+    scene = world(cube=True, photo=True)
+    glass = Material(transmission=1.0)
+    ground, cube = scene.bodies
+    pose = SE3.about_z(0.6, (5.0, 0.1, 0.52))
+    cube = replace(cube, T_world_body=pose, materials=(glass,))
+    scene = replace(scene, bodies=(ground, cube))
+    wanted = frozenset({Channel.DEPTH_LAYERS, Channel.INSTANCE_LAYERS}) | LABELS
+    library = PlateLibrary(empty_photo(), half_mask())
+    images = seen(library, scene, wanted).channels
+    depth_m, ids = images[Channel.DEPTH_LAYERS], images[Channel.INSTANCE_LAYERS]
+    bare = seen(library, world(cube=False, photo=True), LABELS).channels[Channel.Z_DEPTH]
+
+    np.testing.assert_array_equal(depth_m[..., 0], images[Channel.Z_DEPTH])
+    np.testing.assert_array_equal(ids[..., 0], images[Channel.INSTANCE])
+    glazed = (ids == [1, 1, 0, 0]).all(axis=-1)
+    assert np.isfinite(depth_m[glazed, 2]).any() and np.isinf(depth_m[glazed, 2]).any()
+    np.testing.assert_allclose(depth_m[glazed, 2], bare[glazed], rtol=1e-4)
+    assert not np.isfinite(depth_m[:, : SIZE_PX[0] // 2]).any(), "the foreground hides all layers"
+
+
+def test_mirrors_behind_the_foreground_show_nothing() -> None:
+    scene = world(cube=True, photo=True)
+    silver = Material((0.9, 0.9, 0.9), 0.02, metallic=1.0)
+    ground, cube = scene.bodies
+    scene = replace(scene, bodies=(ground, replace(cube, materials=(silver,))))
+    wanted = frozenset({Channel.MIRRORED_POSITION, Channel.INSTANCE})
+    images = seen(PlateLibrary(empty_photo(), half_mask()), scene, wanted).channels
+    shown = np.isfinite(images[Channel.MIRRORED_POSITION]).all(axis=-1)
+    assert shown.any() and (images[Channel.INSTANCE][shown] == 1).all()
+    assert not shown[:, : SIZE_PX[0] // 2].any()
+    # All sides of the cube stand on the ground, at height 0.
+    assert np.abs(images[Channel.MIRRORED_POSITION][shown][:, 2]).max() < 1e-3
+
+
 def half_mask() -> NDArray[np.uint8]:
     mask = np.zeros(SIZE_PX[::-1], np.uint8)
     mask[:, : SIZE_PX[0] // 2] = 255

@@ -1,9 +1,13 @@
 """The RGB camera: what it mounts, what it asks a renderer for."""
 
+import pytest
+
 from gen_data.core.capture import Channel
 from gen_data.core.scene import Scene
+from gen_data.core.serialization import from_plain, to_plain
 from gen_data.core.streams import Rng, Streams
 from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.depth.depth_camera import DepthCamera
 from tests.sensors.recorder import Recorder
 
 
@@ -27,3 +31,20 @@ def test_a_mounted_camera_stays_and_renders_its_channels_and_those_asked_for() -
     assert renderer.asked == {Channel.RADIANCE, Channel.Z_DEPTH, Channel.AMODAL}
     assert renderer.camera == scene.camera("eye")
     assert reading.sensor == "eye"
+
+
+@pytest.mark.parametrize("kind", [RgbCamera, DepthCamera])
+def test_a_camera_states_its_layers_where_it_writes_any(
+    kind: type[RgbCamera] | type[DepthCamera],
+) -> None:
+    """Scenes of other cameras stay as they are, also in files."""
+    plain = kind(name="eye").mount(Scene("t"))
+    assert plain.camera("eye").layers == 0
+    assert "layers" not in to_plain(plain)["cameras"][0]
+
+    usual = kind(name="eye", channels=("depth_layers",))
+    more = kind(name="eye", channels=("instance_layers",), layers=7)
+    assert usual.mount(Scene("t")).camera("eye").layers == 4
+    # Also at a camera that is already in the scene.
+    assert more.mount(plain).camera("eye").layers == 7
+    assert from_plain(Scene, to_plain(more.mount(plain))).camera("eye").layers == 7

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 _HOST: dict[Any, tuple[type[np.generic], tuple[int, ...]]] = {
     float: (np.float32, ()),
+    int: (np.int32, ()),
     wp.uint16: (np.uint16, ()),
     wp.vec2: (np.float32, (2,)),
     wp.vec2i: (np.int32, (2,)),

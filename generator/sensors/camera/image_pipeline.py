@@ -38,8 +38,10 @@ from gen_data.sensors.camera.exposure import (
 )
 from gen_data.sensors.camera.image_sensor import (
     ImageSensor,
+    expected_exposure,
     expose,
     expose_colors,
+    filter_shares,
     mosaic,
     scale_filters,
 )
@@ -231,10 +233,12 @@ class Photograph:
     Attributes:
         rgb: sRGB, uint8 [h, w, 3].
         ev100: Exposure value that was set or metered, without compensation and errors.
+        signal: Before noise; None unless asked for.
     """
 
     rgb: NDArray[np.uint8]
     ev100: float
+    signal: capture.ExpectedSignal | None = None
 
 
 def capture_photograph(
@@ -250,9 +254,10 @@ def capture_photograph(
 
     ``rng`` and ``settings_rng`` are those of ``develop``.
     """
+    developed = frozenset({capture.Channel.RGB, capture.Channel.SIGNAL})
     if capture.Channel.RGB not in channels:
-        return renderer.render(scene, camera, channels)
-    needed = (channels - {capture.Channel.RGB}) | {capture.Channel.RADIANCE}
+        return renderer.render(scene, camera, channels - developed)
+    needed = (channels - developed) | {capture.Channel.RADIANCE}
     # Points beside a wide lens have no depth along its axis: it is focused by range.
     depth = capture.Channel.Z_DEPTH if camera.intrinsics.straight else capture.Channel.RANGE
     if pipeline.focus is not None:
@@ -261,9 +266,11 @@ def capture_photograph(
     reading = renderer.render(scene, camera, needed, *tones)
     radiance = reading.channels[capture.Channel.RADIANCE]
     depth_m = reading.channels.get(depth)
-    photo = develop(radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng)
+    shot = set_up_shot(radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng)
+    photo = develop_shot(*shot, with_signal=capture.Channel.SIGNAL in channels)
     images = {k: image for k, image in reading.channels.items() if k in channels}
-    return replace(reading, channels={**images, capture.Channel.RGB: photo.rgb}, ev100=photo.ev100)
+    images[capture.Channel.RGB] = photo.rgb
+    return replace(reading, channels=images, ev100=photo.ev100, signal=photo.signal)
 
 
 def _tones_of(camera: Camera, pipeline: ImagePipeline) -> interfaces.FindTones:
@@ -293,6 +300,20 @@ def develop(
     Raises:
         SampleError: a stage makes NaN or infinite values.
     """
+    shot, ev100 = set_up_shot(radiance, depth_m, camera, weather, pipeline, rng, settings_rng)
+    return develop_shot(shot, ev100)
+
+
+def set_up_shot(
+    radiance: Float32,
+    depth_m: NDArray[np.floating] | None,
+    camera: Camera,
+    weather: Weather,
+    pipeline: ImagePipeline,
+    rng: streams.Rng,
+    settings_rng: streams.Rng | None = None,
+) -> tuple[Shot, float]:
+    """The exposure of a photograph, set or metered, and its exposure value; see ``develop``."""
     noise_rng, rng = rng, (settings_rng or rng).of_sequence()
     ev100 = _set_or_metered(radiance, camera, pipeline)
     wanted = ev100 - _draw(pipeline, "exposure_compensation_ev", rng)
@@ -300,17 +321,33 @@ def develop(
     exposure = ExposureSettings(0.0, 1.0, wanted)
     if pipeline.image_sensor is not None:
         exposure = exposure_settings(wanted, pipeline.exposure_control)
-    shot = Shot(pipeline, camera, radiance, weather, depth_m, exposure, rng, noise_rng)
-    light = Light(radiance, saturation_cd_m2(exposure.ev100))
+    return Shot(pipeline, camera, radiance, weather, depth_m, exposure, rng, noise_rng), ev100
+
+
+def develop_shot(shot: Shot, ev100: float, *, with_signal: bool = False) -> Photograph:
+    """Apply all of ``STAGES`` and the tone; ``with_signal`` adds the signal, and changes no byte.
+
+    Raises:
+        SampleError: a stage makes NaN or infinite values.
+    """
+    pipeline, exposure = shot.pipeline, shot.exposure
+    light, signal = Light(shot.radiance, saturation_cd_m2(exposure.ev100)), None
     for stage in STAGES:
+        if with_signal and stage is _image_sensor and pipeline.image_sensor is not None:
+            signal = _expected_signal(light, pipeline.image_sensor, shot)
         light = stage(light, shot)
     if not np.isfinite(light.values).all():
         # The tone curve makes a bound of it.
         raise errors.SampleError(
-            f"{camera.name}.image_pipeline: a stage makes NaN or infinite values of finite "
+            f"{shot.camera.name}.image_pipeline: a stage makes NaN or infinite values of finite "
             f"radiance (exposure value {exposure.ev100:g}, gain {exposure.gain:g})"
         )
-    return Photograph(_compress(_tone(light, shot), shot), ev100)
+    rgb = _compress(_tone(light, shot), shot)
+    if with_signal and signal is None:
+        # Rounding to bytes is all the noise of an ideal camera.
+        quantised = np.full(rgb.shape, 1.0 / (255.0 * math.sqrt(12.0)), np.float32)
+        signal = capture.ExpectedSignal(rgb.astype(np.float32) / np.float32(255.0), quantised)
+    return Photograph(rgb, ev100, signal)
 
 
 def _set_or_metered(radiance: Float32, camera: Camera, pipeline: ImagePipeline) -> float:
@@ -413,6 +450,22 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
         gains = gains / gains.min()
     image = _read_sensor(np.maximum(image, 0.0), gains, sensor, shot)
     return Light(isp.transform_colors(image, srgb_from_camera), 1.0)
+
+
+def _expected_signal(light: Light, sensor: ImageSensor, shot: Shot) -> capture.ExpectedSignal:
+    """Of the photosites, before white balance and demosaicing."""
+    camera_from_srgb, _ = _color_matrices(shot.pipeline)
+    image = np.maximum(isp.transform_colors(light.values, camera_from_srgb / light.white), 0.0)
+    settings = shot.exposure.gain, shot.exposure.time_s, sensor
+    count = shot.pipeline.reduction**2
+    if count > 1.0 and sensor.pattern != "mono":
+        shares = filter_shares(sensor.pattern)
+        planes = [(image[..., k], share * count) for k, share in enumerate(shares)]
+    else:
+        planes = [(mosaic(image, sensor.pattern), count)]
+    expected = [expected_exposure(plane, *settings, photosites) for plane, photosites in planes]
+    mean, stddev = (np.stack(images, axis=-1) for images in zip(*expected, strict=True))
+    return capture.ExpectedSignal(mean, stddev)
 
 
 def _read_sensor(image: Float32, gains: Float32, sensor: ImageSensor, shot: Shot) -> Float32:

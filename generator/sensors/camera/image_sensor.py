@@ -112,13 +112,54 @@ def expose_colors(
     light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng, photosites: float
 ) -> Float32:
     """As ``expose``, of pixels that have photosites behind all filters: float32 [h, w, 3]."""
-    filters = FILTERS[sensor.pattern]
-    shares = [filters.count(k) / len(filters) for k in range(3)]
     colors = [
         expose(light[..., k], gain, time_s, sensor, rng, share * photosites)
-        for k, share in enumerate(shares)
+        for k, share in enumerate(filter_shares(sensor.pattern))
     ]
     return np.stack(colors, axis=-1)
+
+
+def filter_shares(pattern: Pattern) -> list[float]:
+    """Share of the photosites behind the filters of red, green and blue."""
+    filters = FILTERS[pattern]
+    return [filters.count(k) / len(filters) for k in range(3)]
+
+
+def expected_exposure(
+    light: Float32, gain: float, time_s: float, sensor: ImageSensor, photosites: float = 1.0
+) -> tuple[Float32, Float32]:
+    """Mean and standard deviation of ``expose`` over devices and photographs, float32 [h, w] each.
+
+    The total noise of EMVA standard 1288, release 4.0: shot noise of light and dark current, read
+    noise in the middle of its range, non-uniformity of response and offset, and quantisation by
+    steps with a variance of 1/12; hot pixels are left out. Saturated pixels have the mean 1.
+    """
+    mean, stddev = _expected_once(light, gain, time_s, sensor, photosites)
+    reach = 1.0
+    for _ in range(1, sensor.exposures):
+        reach *= sensor.exposure_ratio
+        below = 0.95 * reach / sensor.exposure_ratio
+        shorter = _expected_once(light / reach, gain, time_s / reach, sensor, photosites)
+        # As in ``expose``.
+        bright = mean >= below
+        mean = np.where(bright, shorter[0] * reach, mean)
+        stddev = np.where(bright, shorter[1] * reach, stddev)
+    return mean.astype(np.float32), stddev.astype(np.float32)
+
+
+def _expected_once(
+    light: Float32, gain: float, time_s: float, sensor: ImageSensor, photosites: float
+) -> tuple[Float32, Float32]:
+    well_e = np.float32(sensor.full_well_e * photosites / gain)
+    mean = np.clip(light, 0.0, 1.0)
+    dark_e = 0.5 * sum(sensor.dark_current_e_s.support()) * photosites * time_s
+    read_noise_e = 0.5 * sum(sensor.read_noise_e.support())
+    step_e = float(well_e) / (((1 << sensor.bits) - 1) * photosites)
+    constant_e2 = dark_e + (read_noise_e**2 + sensor.dsnu_e**2) * photosites + step_e**2 / 12.0
+    signal_e = mean * well_e
+    uneven = np.float32(sensor.prnu**2 / photosites)
+    variance_e2 = signal_e * signal_e * uneven + signal_e + np.float32(constant_e2)
+    return mean, np.sqrt(variance_e2) / well_e
 
 
 def _expose_once(

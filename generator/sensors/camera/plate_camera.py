@@ -63,4 +63,5 @@ class PlateCamera(rgb_camera.RgbCamera):
                 lens = plates.fitted_intrinsics(camera.intrinsics, *self.size_px)
                 camera = replace(camera, intrinsics=lens, ev100=self.ev100, shutter=shutter)  # noqa: PLW2901
             cameras.append(camera)
-        return replace(scene, cameras=tuple(cameras))
+        mounted = replace(scene, cameras=tuple(cameras))
+        return rgb_camera.with_layers(mounted, self.name, self.layers, self.media)

@@ -10,7 +10,13 @@ from pydantic import Field, model_validator
 
 from gen_data.config.base_model import NAME_PATTERN
 from gen_data.core import errors, scene_time, se3, streams
-from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.capture import (
+    LAYERS,
+    LAYERS_MAX,
+    LAYERS_USUAL,
+    Channel,
+    SensorReading,
+)
 from gen_data.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Camera, Region, Scene
@@ -26,7 +32,9 @@ Image = Literal[
     Channel.RGB, Channel.Z_DEPTH, Channel.RANGE, Channel.NORMALS, Channel.INSTANCE, Channel.PART,
     Channel.CATEGORY, Channel.OBJECT_COORDINATES, Channel.DISPARITY, Channel.DISPARITY_VISIBLE,
     Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_FORWARD,
-    Channel.FLOW_OCCLUDED_BACKWARD, Channel.SCENE_FLOW,
+    Channel.FLOW_OCCLUDED_BACKWARD, Channel.SCENE_FLOW, Channel.DEPTH_LAYERS,
+    Channel.INSTANCE_LAYERS, Channel.MATERIAL_LAYERS, Channel.SEEN_IN_MIRROR,
+    Channel.MIRRORED_POSITION,
 ]  # fmt: skip
 """Channels that can be written as images; see ``gen_data.core.capture.Channel``."""
 
@@ -34,6 +42,7 @@ PAIRED = frozenset({Channel.DISPARITY, Channel.DISPARITY_VISIBLE})
 """Channels that need a second camera."""
 
 SidePx = Annotated[int, Field(ge=8, le=8192)]
+LayerCount = Annotated[int, Field(ge=1, le=LAYERS_MAX)]
 
 PINHOLE_MAX_DEG = 170.0
 NOMINAL_AZIMUTH_RAD = math.radians(-60.0)
@@ -54,6 +63,8 @@ class RgbCamera(Mounted):
             known ``camera`` or one of a calibration ``file``, with its own field of view.
         intrinsics: Focal lengths and principal point, in place of hfov_deg; null = as hfov_deg.
         channels: Channels to write as images.
+        layers: Number of surfaces along each ray in depth_layers, instance_layers and
+            material_layers, which show all see-through ones and the first that is not.
         ev100: Fixed exposure value at ISO 100; null = metered.
         exposure: Exposure time; null = an instant. Labels refer to the middle of the exposure,
             which is the instant of the step.
@@ -77,6 +88,7 @@ class RgbCamera(Mounted):
     channels: tuple[Image, ...] = Field(
         (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY), min_length=1
     )
+    layers: LayerCount = LAYERS_USUAL
     ev100: float | None = None
     exposure: ExposureTime | None = None
     rolling_shutter: RollingShutter | None = None
@@ -89,6 +101,11 @@ class RgbCamera(Mounted):
     def _has_a_partner(self) -> "RgbCamera":
         if not self.stereo_with and PAIRED & set(self.media):
             raise ValueError("disparity needs a second camera: name it with stereo_with")
+        return self
+
+    @model_validator(mode="after")
+    def _has_layers(self) -> "RgbCamera":
+        check_layers(self.model_fields_set, self.media)
         return self
 
     @model_validator(mode="after")
@@ -144,9 +161,9 @@ class RgbCamera(Mounted):
     def mount(self, scene: Scene) -> Scene:
         """Add this camera, on its rig or looking at the scene's focus, unless it exists."""
         shutter = make_shutter(self.exposure, self.rolling_shutter)
-        return add_camera(
-            scene, self.name, self, self.nominal_intrinsics(), ev100=self.ev100, shutter=shutter
-        )
+        lens = self.nominal_intrinsics()
+        mounted = add_camera(scene, self.name, self, lens, ev100=self.ev100, shutter=shutter)
+        return with_layers(mounted, self.name, self.layers, self.media)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: streams.Rng
@@ -195,6 +212,20 @@ class RgbCamera(Mounted):
             Channel.DISPARITY_VISIBLE: np.where(visible, left_px, np.float32(0.0)),
         }
         return replace(reading, channels={**reading.channels, **pair})
+
+
+def check_layers(fields: Collection[str], channels: Collection[Channel]) -> None:
+    """Raise ValueError if the field ``layers`` is set, but no channel has layers."""
+    if "layers" in fields and not LAYERS.keys() & set(channels):
+        raise ValueError(f"layers: no channel has any; add one of {', '.join(LAYERS)}")
+
+
+def with_layers(scene: Scene, name: str, layers: int, channels: Collection[Channel]) -> Scene:
+    """The scene with a camera's number of layers, if it writes channels that have any."""
+    if not LAYERS.keys() & set(channels):
+        return scene
+    cameras = (replace(c, layers=layers) if c.name == name else c for c in scene.cameras)
+    return replace(scene, cameras=tuple(cameras))
 
 
 def check_camera(name: str, field: str, other: str, known: Collection[str]) -> None:

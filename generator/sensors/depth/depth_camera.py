@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from gen_data.config.base_model import NAME_PATTERN, Strict
 from gen_data.core import errors, streams
-from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.capture import LAYERS_USUAL, Channel, SensorReading
 from gen_data.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import PINHOLE
@@ -74,6 +74,8 @@ OWN = frozenset({Channel.MEASURED_DEPTH, Channel.INFRARED})
 DepthImage = Literal[
     Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.RGB, Channel.Z_DEPTH, Channel.RANGE,
     Channel.NORMALS, Channel.INSTANCE, Channel.PART, Channel.CATEGORY, Channel.OBJECT_COORDINATES,
+    Channel.DEPTH_LAYERS, Channel.INSTANCE_LAYERS, Channel.MATERIAL_LAYERS, Channel.SEEN_IN_MIRROR,
+    Channel.MIRRORED_POSITION,
 ]  # fmt: skip
 """Channels that can be written as images; all but the first two are ground truth."""
 
@@ -90,6 +92,7 @@ class DepthCamera(Mounted):
         hfov_deg: Horizontal field of view; null = the model's.
         intrinsics: Focal lengths and principal point, in place of hfov_deg.
         channels: Channels to write as images.
+        layers: Number of surfaces along each ray in channels of layers, as of rgb_camera.
     """
 
     type: Literal["depth_camera"] = "depth_camera"
@@ -101,6 +104,7 @@ class DepthCamera(Mounted):
     channels: tuple[DepthImage, ...] = Field(
         (Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.Z_DEPTH), min_length=1
     )
+    layers: rgb_camera.LayerCount = LAYERS_USUAL
 
     @field_validator("model")
     @classmethod
@@ -113,6 +117,11 @@ class DepthCamera(Mounted):
             if self.hfov_deg is not None:
                 raise ValueError("intrinsics: excludes hfov_deg")
             self.intrinsics.check_size(*(self.size_px or self.device.size_px))
+        return self
+
+    @model_validator(mode="after")
+    def _has_layers(self) -> "DepthCamera":
+        rgb_camera.check_layers(self.model_fields_set, self.media)
         return self
 
     @property
@@ -146,7 +155,8 @@ class DepthCamera(Mounted):
         Raises:
             ConfigError: the scene has no such rig.
         """
-        return rgb_camera.add_camera(scene, self.name, self, self.nominal_intrinsics())
+        mounted = rgb_camera.add_camera(scene, self.name, self, self.nominal_intrinsics())
+        return rgb_camera.with_layers(mounted, self.name, self.layers, self.media)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: streams.Rng

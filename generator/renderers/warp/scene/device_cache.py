@@ -58,6 +58,7 @@ class DeviceCache:
     Attributes:
         bodies: The latest packed bodies, which all views of a scene share.
         scenes: The latest packed scene, which all cameras and scanners of a sample share.
+        layer_materials: Numbers in ``LAYER_MATERIALS`` of the latest bodies' materials.
         material_records, infrared: Records of a body's materials, by their tuple.
         coarsest: The coarsest texel of textures, on the host.
         pages: Returns pages of files to the system.
@@ -74,6 +75,7 @@ class DeviceCache:
         self.lobes = wp.array(brdf_albedo_lut.lobe_albedo(), dtype=wp.vec2, device=device)
         self.bodies: ObjectCache[Any] = ObjectCache(1)
         self.scenes: ObjectCache[Any] = ObjectCache(1)
+        self.layer_materials: ObjectCache[wp.array] = ObjectCache(1)
         self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
         self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
         self.coarsest: CountCache[NDArray[np.uint32]] = CountCache(_TEXTURES)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import SURFACES, Material
+from gen_data.core.asset_types import LAYER_MATERIALS, SURFACES, Material
 from gen_data.core.scene import Body
 from gen_data.renderers.warp.scene import device_assets, device_cache
 from gen_data.renderers.warp.scene.kernels import records
@@ -22,6 +22,13 @@ _REFLECTANCE_MIN = 1e-3
 _PRINTS = frozenset({"paint", "plate", "sign"})
 """Roles of sheets with print on the outside: from within, a livery would be in mirror writing."""
 _SURFACE = {role: number for number, role in enumerate(SURFACES)}
+_LAYER_MATERIAL = np.array(
+    [LAYER_MATERIALS.index(role if role in LAYER_MATERIALS[1:] else "other") for role in SURFACES],
+    np.uint16,
+)
+SEE_THROUGH = LAYER_MATERIALS.index("see_through")
+MIRROR = LAYER_MATERIALS.index("mirror")
+"""Numbers of materials behind which a ray continues, and that reflect it."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -95,10 +102,33 @@ def surface_records(
         (values["coat"] > 0.0)
         | (values["transmission"] > 0.0)
         | (values["opacity"] < 1.0)
-        | ((values["metallic"] >= 0.5) & (values["roughness"] < records.MIRROR_ROUGHNESS))
+        | is_mirror(values)
         | mapped[values["texture"]]
     )
     return values
+
+
+def is_see_through(surfaces: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Whether cameras see anything behind each of MaterialRecords."""
+    clear = surfaces["transmission"] * (1.0 - surfaces["metallic"])
+    return np.asarray((clear > 0.0) | (surfaces["opacity"] < 1.0))
+
+
+def is_mirror(surfaces: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Whether each of MaterialRecords is metal that shows reflections of the scene."""
+    smooth = surfaces["roughness"] < records.MIRROR_ROUGHNESS
+    return np.asarray((surfaces["metallic"] >= 0.5) & smooth)
+
+
+def layer_materials(per_body: Sequence[BodyMaterials]) -> NDArray[np.uint16]:
+    """Number in ``LAYER_MATERIALS`` of each material of all bodies, in their order."""
+    surfaces = stack_records([entry.surfaces for entry in per_body], records.MaterialRecord)
+    numbers = np.zeros(len(surfaces), np.uint16)
+    if sum(len(entry.roles) for entry in per_body):
+        numbers = _LAYER_MATERIAL[np.concatenate([entry.roles for entry in per_body])]
+    numbers[is_mirror(surfaces)] = MIRROR
+    numbers[is_see_through(surfaces)] = SEE_THROUGH
+    return numbers
 
 
 def cutout_slots(

@@ -1,6 +1,7 @@
 """Label images, which the ray through each pixel's centre decides."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Scene
 from gen_data.renderers.warp.readback import Readback
 from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.visibility import layers, mirrors
 from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.kernels import label_resolve
 from gen_data.renderers.warp.visibility.plates import hide_labels
@@ -20,7 +22,28 @@ from gen_data.renderers.warp.visibility.plates import hide_labels
 def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channel, NDArray[Any]]:
     """All requested label channels, as documented at Channel."""
     drawn = draw_labels(frame, channels)
-    return read_images(drawn, frame.view.height, frame.view.width)
+    images = read_images(drawn, frame.view.height, frame.view.width)
+    parts = trace_further(frame, channels)
+    return images | further_images(frame, images, parts, channels)
+
+
+def trace_further(
+    frame: CameraView, channels: frozenset[Channel]
+) -> tuple[layers.SparseLabels, ...]:
+    """Requested labels of surfaces that a frame shows through glass and in mirrors."""
+    return layers.trace_behind(frame, channels), mirrors.trace_mirrors(frame, channels)
+
+
+def further_images(
+    frame: CameraView,
+    images: Mapping[Channel, NDArray[Any]],
+    parts: Sequence[layers.SparseLabels],
+    channels: frozenset[Channel],
+) -> dict[Channel, NDArray[Any]]:
+    """Images of layers and mirrors: first layers are among images, further labels in parts."""
+    lens = frame.state.camera.intrinsics
+    mirrored = mirrors.mirror_images(channels, parts, lens.height_px, lens.width_px)
+    return layers.stack_layers(frame, images, parts) | mirrored
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,7 +71,12 @@ _DTYPES: dict[Channel, Any] = {
     Channel.RANGE: float,
     Channel.NORMALS: wp.vec3,
     Channel.OBJECT_COORDINATES: wp.vec3,
+    Channel.DEPTH_LAYERS: float,
+    Channel.INSTANCE_LAYERS: wp.uint16,
+    Channel.MATERIAL_LAYERS: wp.uint16,
 }
+"""Types of pixels; of layers, these are the first."""
+_Z_DEPTHS = frozenset({Channel.Z_DEPTH, Channel.DEPTH_LAYERS})
 
 
 def empty_labels(channels: frozenset[Channel], pixels: int, device: wp.Device) -> DrawnLabels:
@@ -69,14 +97,15 @@ def draw_labels(frame: CameraView, channels: frozenset[Channel]) -> DrawnLabels:
 
 
 def _nothing(channel: Channel) -> Any:
-    return math.inf if channel in (Channel.Z_DEPTH, Channel.RANGE) else _DTYPES[channel](0)
+    is_distance = channel is Channel.RANGE or channel in _Z_DEPTHS
+    return math.inf if is_distance else _DTYPES[channel](0)
 
 
 def _draw_label(frame: CameraView, channel: Channel, image: wp.array) -> None:
     scene, view, gbuffer = frame.state.scene, frame.view, frame.gbuffer
-    if channel is Channel.Z_DEPTH and view.lens == records.PINHOLE:
+    if channel in _Z_DEPTHS and view.lens == records.PINHOLE:
         wp.copy(image, gbuffer.z_m)
-    elif channel is Channel.Z_DEPTH:
+    elif channel in _Z_DEPTHS:
         frame.launch(label_resolve.label_z_depths, frame.pixels, [view, gbuffer.z_m], [image])
     elif channel is Channel.RANGE:
         frame.launch(label_resolve.label_ranges, frame.pixels, [view, gbuffer.z_m], [image])
@@ -87,6 +116,8 @@ def _draw_label(frame: CameraView, channel: Channel, image: wp.array) -> None:
         boxes = wp.array(frames, dtype=label_resolve.BoxFrame, device=frame.cache.device)
         inputs = [frame.world.record, gbuffer.hits, gbuffer.weights, boxes]
         frame.launch(label_resolve.label_object_coordinates, frame.pixels, inputs, [image])
+    elif channel is Channel.MATERIAL_LAYERS:
+        layers.draw_materials(frame, image)
     else:
         ids = np.array([0, *_body_ids(scene, channel)], dtype=np.uint16)
         table = wp.array(ids, dtype=wp.uint16, device=frame.cache.device)
@@ -96,7 +127,7 @@ def _draw_label(frame: CameraView, channel: Channel, image: wp.array) -> None:
 def _body_ids(scene: Scene, channel: Channel) -> list[int]:
     if channel is Channel.CATEGORY:
         return category_ids(scene)
-    name = "instance_id" if channel is Channel.INSTANCE else "part_id"
+    name = "part_id" if channel is Channel.PART else "instance_id"
     return [getattr(body, name) for body in scene.bodies]
 
 

@@ -153,6 +153,17 @@ def hide_labels(frame: CameraView, backdrop: Backdrop, image: wp.array, nothing:
     frame.launch(kernels.hide_labels, frame.pixels, inputs, [image])
 
 
+def is_hidden(
+    frame: CameraView, backdrop: Backdrop, pixels: NDArray[np.intp], bodies: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """Whether ``hide_labels`` hides surfaces of bodies [n, k] at pixels [n] of a frame."""
+    places = _first_pixel(frame) + pixels
+    catches = np.array([plates.is_catcher(b) for b in frame.state.scene.bodies] + [False])
+    beside = ~backdrop.ground.reshape(-1)[places]
+    covered = backdrop.hidden.reshape(-1)[places]
+    return np.asarray(covered[:, None] | (catches[bodies] & beside[:, None]))
+
+
 def _kinds(frame: CameraView) -> wp.array:
     """What the body of each number is to the photograph, beginning with none."""
     bodies = frame.state.scene.bodies

@@ -20,6 +20,7 @@ from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 from gen_data.core.shutter import INSTANT
 from gen_data.renderers.warp.readback import Readback
+from gen_data.renderers.warp.visibility import label_images
 from gen_data.renderers.warp.visibility.frame_context import (
     CameraState,
     CameraView,
@@ -27,7 +28,7 @@ from gen_data.renderers.warp.visibility.frame_context import (
     is_moving,
     render_view,
 )
-from gen_data.renderers.warp.visibility.label_images import draw_labels, empty_labels, read_images
+from gen_data.renderers.warp.visibility.layers import SparseLabels
 
 RadianceFunction = Callable[[CameraView], wp.array]
 """Radiance of every pixel of a view [cd/m^2], flat, on the device."""
@@ -136,23 +137,28 @@ def render_bands(
     lens, device = reference.state.camera.intrinsics, reference.cache.device
     pixels = lens.height_px * lens.width_px
     memory = Readback.allocate(pixels, _IMAGES, device)
-    labels = empty_labels(channels, pixels, device)
+    labels = label_images.empty_labels(channels, pixels, device)
     radiance = wp.empty(pixels, dtype=wp.vec3, device=device) if light else None
+    further: list[SparseLabels] = []
     for band in bands:
         first, end = (band.first, band.end) if light is None else add_margin(band, lens.height_px)
         # Neighbouring bands share the most packed data.
         rendered = reference = render_view(band.state, reference.context, (first, end), reference)
         gbuffer = rendered.gbuffer
         seen = (gbuffer.hits, gbuffer.z_m, gbuffer.weights)
-        drawn = draw_labels(rendered, channels).memory
+        drawn = label_images.draw_labels(rendered, channels).memory
         copies = list(zip(memory.parts, seen, strict=True))
         copies += zip(labels.memory.parts, drawn.parts, strict=True)
         if light is not None:
             copies.append((radiance, light(rendered)))
         place, begin = band.first * lens.width_px, (band.first - first) * lens.width_px
+        count = (band.end - band.first) * lens.width_px
         for image, part in copies:
-            wp.copy(image, part, place, begin, (band.end - band.first) * lens.width_px)
-    images = read_images(labels, lens.height_px, lens.width_px)
+            wp.copy(image, part, place, begin, count)
+        parts = label_images.trace_further(rendered, channels)
+        further += (part.moved(begin, count, place) for part in parts)
+    images = label_images.read_images(labels, lens.height_px, lens.width_px)
+    images |= label_images.further_images(reference, images, further, channels)
     return RenderedBands(BandedGBuffer(tuple(bands), memory), images, radiance)
 
 
