@@ -35,6 +35,7 @@ TABLE = PluginTable[Exporter](
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",
         "nuscenes": "gen_data.exporters.nuscenes:NuScenes",
         "occupancy": "gen_data.exporters.occupancy:OccupancyGrids",
+        "opendrive": "gen_data.exporters.opendrive:OpenDrive",
         "openlane": "gen_data.exporters.openlane:OpenLane",
         "pointclouds": "gen_data.exporters.pointclouds:PointClouds",
         "rerun": "gen_data.exporters.rerun:Rerun",

@@ -11,13 +11,7 @@ import numpy as np
 
 from gen_data.core import capture, errors, plugins, whole_files
 from gen_data.core.sample import Sample, SensorTracks
-from gen_data.preview.overlay import (
-    Image,
-    channel_image,
-    draw_labels,
-    draw_tracks,
-    layer_images,
-)
+from gen_data.preview.overlay import Image, channel_image, draw_labels, draw_tracks, layer_images
 from gen_data.preview.sensor_views import range_view, top_view
 from gen_data.preview.voxel_view import oblique_view
 from gen_data.sensors.lidar import pseudo_lidar
@@ -68,12 +62,11 @@ def make_tiles(
                 if labels and channel is capture.Channel.RGB:
                     unit = reading.camera.intrinsics.width_px / width_px if width_px else 1.0
                     image = draw_labels(reading, sample.truth[name], unit)
-                    yield Tile(caption, ways.drawn(image, name, unit))
-                elif channel in capture.LAYERS:
-                    for number, image in enumerate(layer_images(reading, channel)):
-                        yield Tile(f"{name} {channel.value} {number}", image)
+                    if name in ways.seen:
+                        draw_tracks(image, ways.seen[name], unit)
+                    yield Tile(caption, image)
                 else:
-                    yield Tile(caption, channel_image(reading, channel))
+                    yield from _channel_tiles(caption, reading, channel)
         for name, cloud in sorted(sample.capture.clouds.items()):
             if cloud.lidar.model == pseudo_lidar.MODEL:
                 # The depth image of its camera says the same.
@@ -86,6 +79,16 @@ def make_tiles(
                 yield Tile(name, draw(table, sample.scene, aspect))
         if sample.frame is not None and sample.frame.occupancy is not None:
             yield Tile("occupancy", oblique_view(sample.frame.occupancy, sample.scene))
+
+
+def _channel_tiles(
+    caption: str, reading: capture.SensorReading, channel: capture.Channel
+) -> Iterator[Tile]:
+    if channel not in capture.LAYERS:
+        yield Tile(caption, channel_image(reading, channel))
+        return
+    for number, image in enumerate(layer_images(reading, channel)):
+        yield Tile(f"{reading.sensor} {channel.value} {number}", image)
 
 
 @dataclass
@@ -103,12 +106,6 @@ class _Ways:
         if sample.frame is not None and sample.frame.tracks is not None:
             for name, tracks in sample.frame.tracks.sensors.items():
                 self.seen.setdefault(name, []).append(tracks)
-
-    def drawn(self, image: Image, sensor: str, unit: float) -> Image:
-        """The image of a sensor, in which its points are drawn if it has any."""
-        if sensor in self.seen:
-            draw_tracks(image, self.seen[sensor], unit)
-        return image
 
 
 def render_tiles(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:

@@ -26,7 +26,7 @@ from gen_data.core.sample import (
     SensorTracks,
     Utterance,
 )
-from gen_data.core.scene import Camera, Instance, Scene
+from gen_data.core.scene import Camera, Instance, Lane, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
 from tests.exporters import (
@@ -52,6 +52,7 @@ from tests.exporters import (
     test_motchallenge,
     test_nuscenes,
     test_occupancy,
+    test_opendrive_export,
     test_rerun,
     test_rgbd_sequences,
     test_scans,
@@ -129,6 +130,11 @@ def raised(knots: Any) -> Any:
     return tuple(tuple(v + 0.01 for v in knot) for knot in knots)
 
 
+def beside(center: Any) -> Any:
+    """Points, each 1 cm to the side."""
+    return tuple((x + 0.01, y, z) for x, y, z in center)
+
+
 def moved(box: BoxPx) -> BoxPx:
     return BoxPx(box.x_min + 1, box.y_min, box.x_max + 1, box.y_max)
 
@@ -165,6 +171,7 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
         everywhere(Instance, box_min_m=narrow, box_max_m=narrow),
         everywhere(OrientedBox, size_m=narrow),
     ),
+    "streets": (everywhere(Lane, center_m=beside),),
     "surroundings": (everywhere(EgoTruth, boxes3d=everywhere(OrientedBox, size_m=narrow)),),
     "texts": (everywhere(Utterance, answer=lambda _: "many"),),
     "times": (everywhere(Scene, PointCloud, SensorReading, time_s=lambda t: 1.5 * t + 0.05),),
@@ -340,6 +347,8 @@ ROWS = {
         test_nuscenes.test_boxes_are_in_the_global_frame_with_width_first, key_frame_s=0.1),
     "occupancy": row(gridded, "voxels, categories",
         lambda m: test_occupancy.problems(m.folder, m.samples)),
+    "opendrive": row(test_opendrive_export.town, "streets",
+        lambda m: test_opendrive_export.check_files(m.folder)),
     "openlane": row(test_lane_formats.road, "cameras, centres",
         lambda m: test_lane_formats.check_edges(m.folder)),
     "pointclouds": row(scans, "point ids, points, solids",

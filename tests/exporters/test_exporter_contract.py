@@ -10,10 +10,11 @@ from gen_data.exporters import TABLE
 from gen_data.exporters.label_map import LabelMap, MappedExporter
 from tests.exporters.drives import drive_info
 from tests.exporters.test_occupancy import gridded
+from tests.exporters.test_opendrive_export import town
 from tests.exporters.test_tapvid import tracked
 from tests.tiers import sampled
 
-PACKED = {"huggingface", "rlds", "tfrecord", "webdataset", "rerun"}
+PACKED = {"huggingface", "opendrive", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
 EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
 """Formats with regions that a score leaves out class by class; see ``test_ignored_objects``."""
@@ -41,6 +42,8 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
         return drive_info(world), world.reach()
     if exporter.type == "occupancy":
         return drive_info(world), gridded(world)
+    if exporter.type == "opendrive":
+        return town(world)
     if exporter.type == "tapvid":
         return drive_info(world), tracked(world)
     if exporter.type == "bop":
