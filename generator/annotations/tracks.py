@@ -16,7 +16,7 @@ from gen_data.core import capture, errors, interfaces, se3
 from gen_data.core.motion import Trajectory
 from gen_data.core.rolling_shutter_projection import camera_poses, project_moving_points
 from gen_data.core.sample import TRACK_STATES, EgoTruth, PointTracks, SensorTracks
-from gen_data.core.scene import Camera, Scene
+from gen_data.core.scene import Camera, Lidar, Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.core.streams import Rng
 
@@ -44,8 +44,9 @@ class Tracks(Strict):
     enough. Panes of glass have none. Points keep to their place on a triangle of the mesh: on
     people also while they walk. Fewer points than asked for are found where little is in view.
 
-    A ray from the sensor to each point decides whether it is seen. With a rolling shutter image
-    coordinates and states refer to the instant of the point's row, camera coordinates to the
+    A ray from each camera and laser scanner to each point decides whether it is seen; scanners look
+    all around, from the origin of their frame in the middle of the sweep. With a rolling shutter
+    image coordinates and states refer to the instant of the point's row, camera coordinates to the
     image's instant.
 
     Attributes:
@@ -97,6 +98,10 @@ class Tracks(Strict):
             scenes[id(then)] = then
             projected = _project(points, then, reading.camera, view.assets)
             views.setdefault(id(then), {})[name] = projected
+        for name, cloud in sorted(capture.clouds.items()):
+            then = view.at(cloud.time_s)
+            scenes[id(then)] = then
+            views.setdefault(id(then), {})[name] = _in_lidar(points, then, cloud.lidar, view.assets)
         sensors: dict[str, SensorTracks] = {}
         for number, then in scenes.items():
             sensors |= _trace(then, views[number], view.renderer)
@@ -168,9 +173,9 @@ def _locate(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Projected:
-    """The points in one image: camera frame [m], image [px], and rays to them."""
+    """The points in one reading: sensor frame [m], image [px], rays to them, which to trace."""
 
-    p_camera: se3.Array
+    p_sensor: se3.Array
     image_px: se3.Array
     lines: SightLines
     inside: NDArray[np.bool_]
@@ -194,10 +199,21 @@ def _project(
     return _Projected(p_camera, image_px, lines, inside)
 
 
+def _in_lidar(
+    points: SurfacePoints, scene: Scene, lidar: Lidar, assets: interfaces.AssetLibrary
+) -> _Projected:
+    """The points in the frame of a scanner, all around it; ``scene`` is at the scan's instant."""
+    p_world = points.in_world(scene, points.on_bodies(scene, assets))
+    p_lidar = lidar.T_world_lidar.inverse().apply(p_world)
+    eye = np.broadcast_to(lidar.T_world_lidar.translation_m, p_world.shape)
+    nowhere = np.full((len(p_world), 2), np.nan)
+    return _Projected(p_lidar, nowhere, SightLines(eye, p_world), np.ones(len(p_world), np.bool_))
+
+
 def _trace(
     scene: Scene, views: Mapping[str, _Projected], renderer: interfaces.Renderer
 ) -> dict[str, SensorTracks]:
-    """The points as several cameras have them at one instant."""
+    """The points as several sensors have them at one instant."""
     lines = [one.lines.take(np.flatnonzero(one.inside)) for one in views.values()]
     found = trace_sight_lines(scene, lines, renderer)
     tracks = {}
@@ -205,8 +221,8 @@ def _trace(
         states = np.where(np.isfinite(one.image_px[:, 0]), OUTSIDE, BEHIND).astype(np.uint8)
         hidden = np.zeros(len(states), np.uint16)
         states[one.inside], hidden[one.inside] = state, hidden_by
-        p_camera, image_px = (a.astype(np.float32) for a in (one.p_camera, one.image_px))
-        tracks[name] = SensorTracks(p_camera, image_px, states, hidden)
+        p_sensor, image_px = (a.astype(np.float32) for a in (one.p_sensor, one.image_px))
+        tracks[name] = SensorTracks(p_sensor, image_px, states, hidden)
     return tracks
 
 

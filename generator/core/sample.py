@@ -339,7 +339,8 @@ class SensorTracks:
 
     Attributes:
         position_m: In the sensor's frame at the reading's instant, float32 [n, 3].
-        image_px: Image coordinates, float32 [n, 2]; NaN where the lens has no image of the point.
+        image_px: Image coordinates, float32 [n, 2]; NaN where the lens has no image of the point,
+            and for scanners.
         state: Index in ``TRACK_STATES``, uint8 [n].
         hidden_by: Instance id of the first surface that hides the point, or of the first pane
             before it, uint16 [n]; 0 = none, or a surface without an id.

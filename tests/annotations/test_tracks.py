@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from gen_data.annotations.tracks import Tracks
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.asset_types import Material, MeshData
-from gen_data.core.capture import Capture, SensorReading
+from gen_data.core.capture import POINT, Capture, PointCloud, SensorReading
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetLibrary, ViewSequence
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.core.motion import StateChange
 from gen_data.core.sample import TRACK_STATES, EgoTruth, PointTracks, SensorTracks
-from gen_data.core.scene import Body, Camera, Scene
+from gen_data.core.scene import Body, Camera, Lidar, Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.core.se3 import SE3, Array, look_at
 from gen_data.core.shutter import INSTANT, Shutter
@@ -177,6 +177,35 @@ def test_a_box_before_the_wall_hides_points_and_is_named() -> None:
         own = (tracks.instance_id == 7) & (seen.state == OCCLUDED)
         assert set(seen.hidden_by[own]) <= {7}
     assert max(counts) > 10
+
+
+def test_a_scanner_has_the_points_in_its_frame_and_sees_past_other_edges() -> None:
+    """A metre to the left of the camera, turned by a right angle; hidden by the slabs of a box."""
+    box = Body("box", "box", SE3((0.0, 0.0, 3.0)), instance_id=7)
+    scene = world(box, WALL)
+    half = np.sqrt(0.5)
+    pose = SE3((-1.0, 0.0, 0.0), (half, 0.0, 0.0, half))
+    view = sequence(scene, 1)
+    annotator = Tracks(points=300)
+    cloud = PointCloud("top", Lidar("top", "", T_world_lidar=pose), np.zeros(0, POINT))
+    frame = annotator.annotate_step(
+        view, annotator.begin(view), view.at(0.0), Capture({}, {"top": cloud}), EgoTruth()
+    )
+    assert frame.tracks is not None
+    seen, p = frame.tracks.sensors["top"], frame.tracks.position_m.astype(float)
+    x, y, z = p.T
+    np.testing.assert_allclose(seen.position_m, np.stack([y, -(x + 1.0), z], axis=1), atol=1e-5)
+    on_wall = frame.tracks.instance_id == 0
+    low, high = np.array([-0.5, -0.5, 2.5]), np.array([0.5, 0.5, 3.5])
+    eye = np.array(pose.translation_m)
+    around = [slab_hit(eye, p[on_wall], low - e, high + e) for e in (-1e-3, 1e-3)]
+    clear = around[0] == around[1]
+    hidden = seen.state[on_wall] == OCCLUDED
+    assert (hidden == around[0])[clear].all()
+    assert 5 < hidden.sum() < on_wall.sum() - 5
+    assert set(seen.hidden_by[on_wall][hidden]) == {7}
+    assert set(seen.state) == {VISIBLE, OCCLUDED}
+    assert np.isnan(seen.image_px).all()
 
 
 def test_behind_a_pane_points_are_seen_through_it_and_none_is_on_it() -> None:
