@@ -44,6 +44,7 @@ TABLE = PluginTable[Exporter](
         "solo": "gen_data.exporters.solo:Solo",
         "tables": "gen_data.exporters.measurement_tables:Tables",
         "rlds": "gen_data.exporters.rlds:Rlds",
+        "tapvid": "gen_data.exporters.tapvid:TapVid",
         "tfrecord": "gen_data.exporters.tfrecord:TfRecord",
         "tum_rgbd": "gen_data.exporters.tum_rgbd:TumRgbd",
         "usd": "gen_data.exporters.usd:Usd",

@@ -249,6 +249,18 @@ def by_numpy_voxels(root: Path) -> Iterator[View]:
         yield View(truth.image_name(row.index, "world"), things)
 
 
+def by_numpy_tracks(root: Path) -> Iterator[View]:
+    """Places of tracked points in the frames of cameras, whether they are seen, and lenses."""
+    for path in sorted((root / "tapvid3d").glob("*/*.npz")):
+        scene = np.load(path)
+        sequence, _, camera = path.stem.partition("_")
+        steps = len(scene["visibility"])
+        for step, seen in enumerate(scene["visibility"]):
+            points = thing("points", scene["tracks_XYZ"][step].ravel(), seen[None])
+            lens = tuple(scene["fx_fy_cx_cy"].tolist())
+            yield View(truth.image_name(int(sequence) * steps + step, camera), (points,), lens)
+
+
 def by_pandas_birdseye(root: Path) -> Iterator[View]:
     """Boxes in the frame of the ego, moved to the world, and layers of the map."""
     import pandas

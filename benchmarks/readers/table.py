@@ -24,6 +24,7 @@ from benchmarks.readers.truth import (
     scans,
     scans_and_lenses,
     step_geometry,
+    tracks,
     voxels,
 )
 from gen_data.core.scene import Instance
@@ -204,6 +205,7 @@ READERS: tuple[Reader, ...] = (
     Reader("pandas", "birdseye", S.by_pandas_birdseye, birdseye, "rig", "m", 2e-4, iou=1,
            is_partial=True, because="tenths of a millimetre; objects of the map"),
     Reader("numpy", "occupancy", S.by_numpy_voxels, voxels, "rig", "m", iou=1),
+    Reader("numpy", "tapvid", S.by_numpy_tracks, tracks, "rig", "m", iou=1, lens=0),
     Reader("opencv-python-headless", "scannet", S.by_opencv_scannet,
            Images(("color",), {"depth": millimetres, "pose": pose}, nyu40_class), unit="px, mm",
            tolerance=0.501, iou=1, lens=1e-6, because="whole millimetres, NYU40's classes"),

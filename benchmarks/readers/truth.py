@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import gen_data
 from benchmarks.readers.views import Thing, View, cube, of_pixels, thing
 from gen_data.api.sample import CameraReading
-from gen_data.core.sample import MaskPx, Predicate
+from gen_data.core.sample import TRACK_STATES, MaskPx, Predicate, SensorTracks
 from gen_data.core.scene import Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import motchallenge
@@ -204,6 +204,27 @@ def voxels(folder: Path) -> Iterator[View]:
         masks |= {f"observed by {name}": mask for name, mask in grid.observed.items()}
         things = (thing(name, grid.low_m, mask) for name, mask in masks.items())
         yield View(image_name(sample.index, "world"), tuple(things))
+
+
+def tracks(folder: Path) -> Iterator[View]:
+    """Places of tracked points in the frames of cameras, whether they are seen, and lenses.
+
+    All samples are one sequence. Points that a camera never sees in it are left out.
+    """
+    steps: dict[str, dict[int, SensorTracks]] = defaultdict(dict)
+    lenses = {}
+    for sample in gen_data.open(folder):
+        assert sample.core.frame is not None
+        assert sample.core.frame.tracks is not None
+        for name, reading in sample.cameras.items():
+            steps[name][sample.index] = sample.core.frame.tracks.sensors[name]
+            lenses[name] = lens(reading)
+    for name, seen in steps.items():
+        visible = {k: t.state <= TRACK_STATES.index("glass") for k, t in seen.items()}
+        kept = np.any(list(visible.values()), axis=0)
+        for index, found in seen.items():
+            points = thing("points", found.position_m[kept].ravel(), visible[index][kept][None])
+            yield View(image_name(index, name), (points,), lenses[name])
 
 
 def grasps(folder: Path) -> Iterator[View]:

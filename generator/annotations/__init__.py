@@ -10,6 +10,7 @@ from gen_data.core.interfaces import (
     CaptureAnnotator,
     FrameAnnotator,
     ImageAnnotator,
+    SequenceAnnotator,
 )
 from gen_data.core.plugins import PluginTable
 
@@ -34,7 +35,8 @@ TABLE = PluginTable[AnyAnnotator](
         "poses": "gen_data.annotations.poses:Poses",
         "relations": "gen_data.annotations.relations:Relations",
         "semantic_masks": "gen_data.annotations.semantic_masks:SemanticMasks",
+        "tracks": "gen_data.annotations.tracks:Tracks",
         "visibility": "gen_data.annotations.visibility:Visibility",
     },
-    (Annotator, ImageAnnotator, FrameAnnotator, CaptureAnnotator),
+    (Annotator, ImageAnnotator, FrameAnnotator, CaptureAnnotator, SequenceAnnotator),
 )

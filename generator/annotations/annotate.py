@@ -58,9 +58,13 @@ def annotate_ego(
 ) -> EgoTruth | None:
     """Annotate one sample as a whole; None without an annotator of samples.
 
-    ``scenes`` are as in ``FrameAnnotator``.
+    ``scenes`` are as in ``FrameAnnotator``. Annotators of sequences add their fields later.
     """
-    whole = (interfaces.FrameAnnotator, interfaces.CaptureAnnotator)
+    whole = (
+        interfaces.FrameAnnotator,
+        interfaces.CaptureAnnotator,
+        interfaces.SequenceAnnotator,
+    )
     if not any(isinstance(a, whole) for a in annotators):
         return None
     scene = scenes[""]

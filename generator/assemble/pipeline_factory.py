@@ -200,6 +200,9 @@ def pipeline_config(
             assets=library,
         ),
         frame_truth=lambda scenes, capture: annotate_ego(scenes, annotators, library, capture),
+        sequence_annotators=tuple(
+            a for a in annotators if isinstance(a, interfaces.SequenceAnnotator)
+        ),
         split_shares=config.split_shares,
         split_assignment=config.general.splits.assign,
         layout_attempts_max=config.general.physics.layout_attempts_max,

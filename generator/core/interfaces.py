@@ -18,8 +18,9 @@ Every member of a Protocol below is required. Base classes provide those that fe
 The kind ``asset_family`` differs: its entry points name instances of
 ``gen_data.assets.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
 
-Forbidden operations are impossible by design: randomizers get no engine, annotators no rng, and
-exporters process one shard at a time and compute ids instead of counting.
+Forbidden operations are impossible by design: randomizers get no engine, annotators no rng (except
+annotators of sequences, which choose once per view), and exporters process one shard at a time and
+compute ids instead of counting.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -509,7 +510,62 @@ class CaptureAnnotator(Protocol):
         ...
 
 
-AnyAnnotator = Annotator | ImageAnnotator | FrameAnnotator | CaptureAnnotator
+@dataclass(frozen=True, eq=False, slots=True)
+class ViewSequence:
+    """All steps of one view, for annotators of sequences.
+
+    Attributes:
+        at: The scene at an instant [s], for sensors and labels.
+        instants_s: Of its steps.
+        assets: Geometry.
+        renderer: Traces rays.
+        streams: Random streams of the view, the same at all steps.
+    """
+
+    at: Callable[[float], Scene]
+    instants_s: tuple[float, ...]
+    assets: AssetLibrary
+    renderer: Renderer
+    streams: streams.Streams
+
+
+@runtime_checkable
+class SequenceAnnotator(Protocol):
+    """Annotates samples with something that all steps of their sequence share.
+
+    ``begin`` chooses it from the view alone: every step can do so by itself, with the same result,
+    so that samples depend on no other. The pipeline keeps the result while it works on the view.
+    """
+
+    @property
+    def channels(self) -> frozenset[Channel]:
+        """Channels that it requires."""
+        ...
+
+    def begin(self, view: ViewSequence) -> object:
+        """Choose what the steps share: a pure function of the view.
+
+        Raises:
+            ConfigError: the scene lacks something that the annotator needs.
+        """
+        ...
+
+    def annotate_step(
+        self, view: ViewSequence, begun: Any, scene: Scene, capture: Capture, truth: EgoTruth
+    ) -> EgoTruth:
+        """The truth of one step with this annotator's fields filled in.
+
+        Args:
+            view: The whole sequence.
+            begun: Result of ``begin``.
+            scene: The scene at the sample's instant.
+            capture: The sample's readings.
+            truth: Annotations so far.
+        """
+        ...
+
+
+AnyAnnotator = Annotator | ImageAnnotator | FrameAnnotator | CaptureAnnotator | SequenceAnnotator
 """An annotation plug-in has ``channels`` and the method of one of these Protocols, or of several.
 
 It fills in its own fields of the truth and leaves the rest as it is; it changes no argument.

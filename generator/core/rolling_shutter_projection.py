@@ -1,5 +1,7 @@
 """Projection with a rolling shutter: every point at the instant of the row that shows it."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,21 +24,42 @@ def project_rolling_shutter(
         Points in the camera frame of their instant [m], [n, 3], and their image coordinates [px],
         [n, 2]; NaN for points outside the lens's field.
     """
-    shutter, lens = camera.shutter, camera.intrinsics
     p_frame = np.asarray(points_m, np.float64)
-    delays_s = np.zeros(len(p_frame))
-    for _ in range(_ITERATIONS if shutter.rolls else 1):
-        p_world = p_frame
-        if instance is not None:
-            carrier = _find_carrier(scene, instance)
-            R, t = _poses(scene, carrier, instance.T_world_instance, IDENTITY, delays_s)
-            p_world = np.einsum("nij,nj->ni", R, p_frame, optimize=False) + t
-        R, t = _camera_poses(scene, camera, delays_s)
-        p_camera = np.einsum("nji,nj->ni", R, p_world - t, optimize=False)
-        image_px = lens.project(p_camera)
-        v = np.clip(image_px[:, 1], 0.0, lens.height_px)
-        delays_s = np.where(np.isfinite(v), shutter.delay_s(v, lens.height_px), delays_s)
+
+    def world(delays_s: Array) -> Array:
+        if instance is None:
+            return p_frame
+        carrier = _find_carrier(scene, instance)
+        R, t = _poses(scene, carrier, instance.T_world_instance, IDENTITY, delays_s)
+        return np.asarray(np.einsum("nij,nj->ni", R, p_frame, optimize=False) + t)
+
+    p_camera, image_px, _ = project_moving_points(scene, camera, world, len(p_frame))
     return p_camera, image_px
+
+
+def project_moving_points(
+    scene: Scene, camera: Camera, world: Callable[[Array], Array], count: int
+) -> tuple[Array, Array, Array]:
+    """Project moving points at the instants of the rows that show them.
+
+    Args:
+        scene: At the image's instant.
+        camera: Of the image.
+        world: World coordinates [m] of the points, [n, 3], at their delays from that instant [n].
+        count: Number of points.
+
+    Returns:
+        As ``project_rolling_shutter``, and the delay of each point [s], [n].
+    """
+    shutter, lens = camera.shutter, camera.intrinsics
+    delays_s = np.zeros(count)
+    for _ in range(_ITERATIONS if shutter.rolls else 1):
+        R, t = camera_poses(scene, camera, delays_s)
+        p_camera = np.einsum("nji,nj->ni", R, world(delays_s) - t, optimize=False)
+        image_px = lens.project(p_camera)
+        seen_s, v = delays_s, np.clip(image_px[:, 1], 0.0, lens.height_px)
+        delays_s = np.where(np.isfinite(v), shutter.delay_s(v, lens.height_px), delays_s)
+    return p_camera, image_px, seen_s
 
 
 def world_points(
@@ -49,7 +72,7 @@ def world_points(
     if not camera.shutter.rolls:
         return camera.T_world_camera.apply(p_camera_m)
     delays_s = camera.shutter.row_delays_s(camera.intrinsics.height_px)
-    R, t = _camera_poses(scene, camera, delays_s)
+    R, t = camera_poses(scene, camera, delays_s)
     return np.asarray(np.einsum("nij,nj->ni", R[rows], p_camera_m, optimize=False) + t[rows])
 
 
@@ -61,7 +84,8 @@ def _find_carrier(scene: Scene, instance: Instance) -> str:
     return next(own, "")
 
 
-def _camera_poses(scene: Scene, camera: Camera, delays_s: Array) -> tuple[Array, Array]:
+def camera_poses(scene: Scene, camera: Camera, delays_s: Array) -> tuple[Array, Array]:
+    """Rotations [n, 3, 3] and centres [n, 3] of a camera, world, at delays from the instant [n]."""
     if not camera.rig:
         return _poses(scene, "", camera.T_world_camera, IDENTITY, delays_s)
     rig = scene.rig(camera.rig)

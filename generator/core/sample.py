@@ -328,6 +328,49 @@ class Occupancy:
         return velocities
 
 
+TRACK_STATES = ("visible", "glass", "occluded", "outside", "behind")
+"""Whether a sensor sees a tracked point, by index: yes; through panes of glass only; hidden by a
+surface; not in the image; behind the plane of a pinhole or outside a lens's field."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SensorTracks:
+    """Tracked points as one sensor has them.
+
+    Attributes:
+        position_m: In the sensor's frame at the reading's instant, float32 [n, 3].
+        image_px: Image coordinates, float32 [n, 2]; NaN where the lens has no image of the point.
+        state: Index in ``TRACK_STATES``, uint8 [n].
+        hidden_by: Instance id of the first surface that hides the point, or of the first pane
+            before it, uint16 [n]; 0 = none, or a surface without an id.
+    """
+
+    position_m: NDArray[np.float32]
+    image_px: NDArray[np.float32]
+    state: NDArray[np.uint8]
+    hidden_by: NDArray[np.uint16]
+
+    @property
+    def visible(self) -> NDArray[np.bool_]:
+        """Whether each point is seen, through air alone, bool [n]."""
+        return np.asarray(self.state == TRACK_STATES.index("visible"))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PointTracks:
+    """Points on surfaces, the same ones in all samples of a sequence, in the same order.
+
+    Attributes:
+        instance_id: Instance that each is on, uint16 [n]; 0 = none.
+        position_m: In the world at the sample's instant, float32 [n, 3].
+        sensors: By name, as every sensor that reads at this step has them.
+    """
+
+    instance_id: NDArray[np.uint16]
+    position_m: NDArray[np.float32]
+    sensors: Mapping[str, SensorTracks]
+
+
 @dataclass(frozen=True, slots=True)
 class Grasp:
     """A pose at which a parallel gripper can hold an instance.
@@ -376,6 +419,7 @@ class EgoTruth:
         borders: Of lanes, world (lanes).
         birdseye: The ground from above (bev_map).
         occupancy: Voxels around the ego (occupancy).
+        tracks: Points followed over the sequence (tracks).
         relations: Of annotated instances in space, whoever sees them, in order (relations).
         grasps: Of annotated loose instances, by instance and falling score (grasps).
         suctions: The same for suction cups (grasps).
@@ -389,6 +433,7 @@ class EgoTruth:
     borders: tuple[lane_geometry.LaneBorder, ...] | None = None
     birdseye: BirdseyeMap | None = None
     occupancy: Occupancy | None = field(default=None, metadata={serialization.SPARSE: True})
+    tracks: PointTracks | None = field(default=None, metadata={serialization.SPARSE: True})
     relations: tuple[Relation, ...] | None = None
     grasps: tuple[Grasp, ...] | None = None
     suctions: tuple[Suction, ...] | None = None

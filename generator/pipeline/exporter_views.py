@@ -22,11 +22,16 @@ from gen_data.core.interfaces import (
     Modality,
     reading_paths,
 )
-from gen_data.core.sample import ImageTruth, Sample
+from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Camera, Device, Lidar, Scene
 from gen_data.exporters.base import ExporterBase, Rectify, check_image_formats, select_names
 from gen_data.exporters.image_files import encode_channel, link_or_copy, read_image
-from gen_data.pipeline.rectification import NOTHING, rectification, rectified_truth
+from gen_data.pipeline.rectification import (
+    NOTHING,
+    rectification,
+    rectified_tracks,
+    rectified_truth,
+)
 
 T = TypeVar("T")
 
@@ -178,7 +183,23 @@ class ExporterView:
                 readings, _chosen(capture.clouds, names), _chosen(capture.tables, names)
             ),
             truth=truth,
+            frame=self._frame(sample, names),
         )
+
+    def _frame(self, sample: Sample, names: set[str]) -> EgoTruth | None:
+        """Annotations of the sample as a whole: tracked points as the view's sensors have them."""
+        frame = sample.frame
+        if frame is None or frame.tracks is None:
+            return frame
+        sensors = {}
+        for name, tracks in _chosen(frame.tracks.sensors, names).items():
+            image = sample.truth.get(name)
+            if self.rectify is None or image is None or image.camera.intrinsics.straight:
+                sensors[name] = tracks
+            else:
+                bent = rectification(image.camera.intrinsics, self.rectify)
+                sensors[name] = rectified_tracks(tracks, bent)
+        return replace(frame, tracks=replace(frame.tracks, sensors=sensors))
 
     def _scene(self, scene: Scene, names: set[str]) -> Scene:
         """The scene with the cameras of the view, and those at which other sensors are mounted."""

@@ -43,6 +43,7 @@ class PipelineConfig:
         frame_truth: Annotates a sample as a whole, given the scene at the sample's instant by
             ``""`` and at each laser scanner's by its name, and the readings; None = no such
             annotations.
+        sequence_annotators: Add to the annotations of samples as a whole, which they need.
         split_shares: ``{split: share}`` in order; shares sum to 1.
         split_assignment: How scenes are assigned to splits.
         layout_attempts_max: Largest number of attempts at one scene.
@@ -59,6 +60,7 @@ class PipelineConfig:
     exporters: Mapping[str, interfaces.Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
     frame_truth: Callable[[Mapping[str, Scene], Capture], EgoTruth | None] | None = None
+    sequence_annotators: Sequence[interfaces.SequenceAnnotator] = ()
     split_assignment: splits.Assignment = "random"
     located_errors: Callable[[], AbstractContextManager[None]] = nullcontext
 
@@ -118,6 +120,7 @@ class Pipeline:
         self._latest: AcceptedScene | None = None
         self._view: DrawnView | None = None
         self._lifted: tuple[Scene, Scene] | None = None
+        self._begun: tuple[Scene, tuple[object, ...]] | None = None
         self._offsets_s = {s.name: s.time_offset_s for s in config.info.sensors}
         self._category_ids = {name: i for i, name in enumerate(config.info.categories, 1)}
 
@@ -212,6 +215,8 @@ class Pipeline:
             seen = {name: timeline.at(r.time_s) for name, r in capture.readings.items()}
             described = self.config.frame_truth
             frame = described({"": scene, **swept}, capture) if described is not None else None
+            if frame is not None and self.config.sequence_annotators:
+                frame = self._annotate_sequence(view, timeline, scene, capture, frame)
         return Sample(
             index=view.number * self.info.steps_per_scene + step_index,
             scene_index=streams.scene,
@@ -257,6 +262,30 @@ class Pipeline:
                     truth[sensor.name] = self.config.image_truth(timeline.at(seen.time_s), seen)
                 readings[sensor.name] = seen
         return Capture(readings, clouds, tables), truth
+
+    def _annotate_sequence(
+        self,
+        view: DrawnView,
+        timeline: Timeline,
+        scene: Scene,
+        capture: Capture,
+        truth: EgoTruth,
+    ) -> EgoTruth:
+        """Annotations that depend on the whole sequence, of which this is one step."""
+        annotators = self.config.sequence_annotators
+        steps, step_s = self.info.steps_per_scene, self.info.step_s
+        sequence = interfaces.ViewSequence(
+            timeline.at,
+            tuple(k * step_s for k in range(steps)),
+            self.assets,
+            self.renderer,
+            view.streams,
+        )
+        if self._begun is None or self._begun[0] is not view.scene:
+            self._begun = view.scene, tuple(a.begin(sequence) for a in annotators)
+        for annotator, begun in zip(annotators, self._begun[1], strict=True):
+            truth = annotator.annotate_step(sequence, begun, scene, capture, truth)
+        return truth
 
     def accepted_scene(self, scene_index: int) -> AcceptedScene:
         """The settled scene that its views share."""

@@ -27,7 +27,15 @@ from gen_data.core import errors, lens, se3
 from gen_data.core.boxes import BoxPx, tight_box
 from gen_data.core.capture import LAYERS, Channel, SensorReading, Silhouette
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.sample import BorderTruth, ImageTruth, KeypointTruth, MaskPx, ObjectTruth
+from gen_data.core.sample import (
+    TRACK_STATES,
+    BorderTruth,
+    ImageTruth,
+    KeypointTruth,
+    MaskPx,
+    ObjectTruth,
+    SensorTracks,
+)
 from gen_data.core.scene import Scene
 from gen_data.exporters.base import Rectify
 
@@ -326,6 +334,16 @@ def rectified_truth(
         relations=relations,
         utterances=None,
     )
+
+
+def rectified_tracks(tracks: SensorTracks, bent: Rectification) -> SensorTracks:
+    """Tracked points in the new image; those beside it are outside or behind."""
+    image_px = bent.points(tracks.image_px.astype(np.float64))
+    state = tracks.state.copy()
+    state[~bent.shows(image_px)] = TRACK_STATES.index("outside")
+    state[np.isnan(image_px[:, 0])] = TRACK_STATES.index("behind")
+    hidden_by = np.where(state == tracks.state, tracks.hidden_by, np.uint16(0))
+    return SensorTracks(tracks.position_m, image_px.astype(np.float32), state, hidden_by)
 
 
 def _pixel_labels(thing: ObjectTruth, scene: Scene, reading: SensorReading) -> ObjectTruth:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from gen_data.core import capture, errors, plugins, whole_files
-from gen_data.core.sample import Sample
-from gen_data.preview.overlay import Image, channel_image, draw_labels, layer_images
+from gen_data.core.sample import Sample, SensorTracks
+from gen_data.preview.overlay import Image, channel_image, draw_labels, draw_tracks, layer_images
 from gen_data.preview.sensor_views import range_view, top_view
 from gen_data.preview.voxel_view import oblique_view
 from gen_data.sensors.lidar import pseudo_lidar
@@ -41,6 +41,8 @@ def make_tiles(
 ) -> Iterator[Tile]:
     """Yield a tile per sample, camera and channel or layer, two per scan, one of the occupancy.
 
+    Tracked points are drawn with their ways through the samples of the sequence that are shown.
+
     Args:
         samples: Samples to show.
         channels: Channels of every camera.
@@ -48,8 +50,10 @@ def make_tiles(
         views: ``module:function`` that draws the readings of a device, by the device's name.
         width_px: Width of a tile, for lines and names of a legible size; 0 = that of the image.
     """
+    ways = _Ways()
     for sample in samples:
         aspect = 1.0
+        ways.add(sample)
         for name, reading in sorted(sample.capture.readings.items()):
             aspect = reading.camera.intrinsics.width_px / reading.camera.intrinsics.height_px
             shown = [c for c in channels[name] if c in reading.channels]
@@ -57,12 +61,12 @@ def make_tiles(
                 caption = name if len(shown) == 1 else f"{name} {channel.value}"
                 if labels and channel is capture.Channel.RGB:
                     unit = reading.camera.intrinsics.width_px / width_px if width_px else 1.0
-                    yield Tile(caption, draw_labels(reading, sample.truth[name], unit))
-                elif channel in capture.LAYERS:
-                    for number, image in enumerate(layer_images(reading, channel)):
-                        yield Tile(f"{name} {channel.value} {number}", image)
+                    image = draw_labels(reading, sample.truth[name], unit)
+                    if name in ways.seen:
+                        draw_tracks(image, ways.seen[name], unit)
+                    yield Tile(caption, image)
                 else:
-                    yield Tile(caption, channel_image(reading, channel))
+                    yield from _channel_tiles(caption, reading, channel)
         for name, cloud in sorted(sample.capture.clouds.items()):
             if cloud.lidar.model == pseudo_lidar.MODEL:
                 # The depth image of its camera says the same.
@@ -75,6 +79,33 @@ def make_tiles(
                 yield Tile(name, draw(table, sample.scene, aspect))
         if sample.frame is not None and sample.frame.occupancy is not None:
             yield Tile("occupancy", oblique_view(sample.frame.occupancy, sample.scene))
+
+
+def _channel_tiles(
+    caption: str, reading: capture.SensorReading, channel: capture.Channel
+) -> Iterator[Tile]:
+    if channel not in capture.LAYERS:
+        yield Tile(caption, channel_image(reading, channel))
+        return
+    for number, image in enumerate(layer_images(reading, channel)):
+        yield Tile(f"{reading.sensor} {channel.value} {number}", image)
+
+
+@dataclass
+class _Ways:
+    """Tracked points in the samples of a sequence so far, by sensor."""
+
+    seen: dict[str, list[SensorTracks]] = field(default_factory=dict)
+    sequence: tuple[int, int] = (-1, -1)
+
+    def add(self, sample: Sample) -> None:
+        """Add a sample; one of another sequence forgets all before it."""
+        sequence = (sample.scene_index, sample.view_index)
+        if sequence != self.sequence:
+            self.seen, self.sequence = {}, sequence
+        if sample.frame is not None and sample.frame.tracks is not None:
+            for name, tracks in sample.frame.tracks.sensors.items():
+                self.seen.setdefault(name, []).append(tracks)
 
 
 def render_tiles(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:

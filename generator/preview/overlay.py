@@ -184,6 +184,29 @@ def draw_keypoints(image: Image, points: Sequence[sample.KeypointTruth], color: 
         cv2.circle(image, _at(point), 2 << _SHIFT, color, filled, cv2.LINE_AA, _SHIFT)
 
 
+def draw_tracks(image: Image, seen: Sequence[sample.SensorTracks], unit: float = 1.0) -> None:
+    """Draw points and the ways they came, in place; points that are not visible are rings.
+
+    Args:
+        image: A photograph, uint8 [h, w, 3].
+        seen: The points in earlier images of the sequence, and in this one.
+        unit: As of ``draw_labels``.
+    """
+    now = seen[-1]
+    places = [np.clip(np.nan_to_num(t.image_px, nan=-1e4) - 0.5, -1e4, 1e4) for t in seen]
+    shown = now.state < sample.TRACK_STATES.index("outside")
+    for k in np.flatnonzero(shown).tolist():
+        color = id_color(k + 1)
+        way = [p[k] for p, t in zip(places, seen, strict=True) if t.visible[k]]
+        for start, end in pairwise(way):
+            cv2.line(
+                image, _fine(start), _fine(end), color, max(1, round(unit)), cv2.LINE_AA, _SHIFT
+            )
+        filled = cv2.FILLED if now.visible[k] else max(1, round(unit))
+        radius = round(2.5 * max(1.0, unit) * (1 << _SHIFT))
+        cv2.circle(image, _fine(places[-1][k]), radius, color, filled, cv2.LINE_AA, _SHIFT)
+
+
 def _lighter(color: Rgb) -> Rgb:
     """Mix with white, to differ from the tint of the same object."""
     red, green, blue = color
@@ -196,7 +219,12 @@ _SHIFT = 4
 
 def _at(point: sample.KeypointTruth) -> tuple[int, int]:
     u, v = point.image_px
-    return (round((u - 0.5) * (1 << _SHIFT)), round((v - 0.5) * (1 << _SHIFT)))
+    return _fine((u - 0.5, v - 0.5))
+
+
+def _fine(place: Sequence[float] | NDArray[np.floating]) -> tuple[int, int]:
+    """A place with OpenCV's pixel centres, in its fractional coordinates."""
+    return (round(float(place[0]) * (1 << _SHIFT)), round(float(place[1]) * (1 << _SHIFT)))
 
 
 def _in_front(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any] | None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gen_data.core import asset_types, errors, interfaces, intrinsics, se3, skeletons, whole_files
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.capture import LAYERS, Channel, PointCloud, SensorReading
-from gen_data.core.sample import ImageTruth, Occupancy, Sample
+from gen_data.core.sample import TRACK_STATES, ImageTruth, Occupancy, Sample, SensorTracks
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.preview import overlay, palette, sensor_views, voxel_view
 
@@ -111,9 +111,16 @@ class Recorder:
             self.stream.log("world/boxes", boxes_3d(sample))
         if sample.frame is not None and sample.frame.occupancy is not None:
             self._record_voxels(sample.frame.occupancy, sample.scene)
+        tracks = None if sample.frame is None else sample.frame.tracks
+        if tracks is not None:
+            places = rr.Points3D(tracks.position_m, colors=point_colors(len(tracks.position_m)))
+            self.stream.log("world/tracks", places)
         for name, reading in sorted(sample.capture.readings.items()):
             self._set_time(sample, reading.time_s)
             self._record_image(name, reading, sample.truth[name])
+            if tracks is not None:
+                points = tracked_points(tracks.sensors[name])
+                self.stream.log(f"world/cameras/{name}/image/tracks", points)
         for name, cloud in sorted(sample.capture.clouds.items()):
             self._set_time(sample, cloud.time_s)
             self._record_cloud(name, cloud)
@@ -333,6 +340,24 @@ def pinhole(camera: intrinsics.Intrinsics) -> rr.Pinhole:
         height=camera.height_px,
         camera_xyz=rr.ViewCoordinates.RDF,
         image_plane_distance=IMAGE_PLANE_M,
+    )
+
+
+def point_colors(count: int) -> list[palette.Rgb]:
+    """Colours by which tracked points are known in all views."""
+    return [palette.id_color(k + 1) for k in range(count)]
+
+
+def tracked_points(tracks: SensorTracks) -> rr.Points2D:
+    """Convert the tracked points inside an image; hidden ones are smaller."""
+    shown = np.flatnonzero(tracks.state < TRACK_STATES.index("outside"))
+    colors = point_colors(len(tracks.state))
+    return rr.Points2D(
+        tracks.image_px[shown],
+        colors=[colors[k] for k in shown.tolist()],
+        radii=np.where(tracks.visible[shown], -3.0, -1.5),
+        keypoint_ids=shown,
+        show_labels=False,
     )
 
 

@@ -59,7 +59,7 @@ def find_label_gaps(stored: StoredSamples) -> LabelGaps:
     """Find what has no label. Reading ends as soon as every sensor has one.
 
     Labels are visible, annotated objects that the label map of the configuration keeps and does not
-    ignore. A data set without annotations and exporters has no gaps.
+    ignore, and visible tracked points. A data set without annotations and exporters has no gaps.
 
     Raises:
         StorageError: a file is missing or damaged.
@@ -110,6 +110,9 @@ def _has_label(sample: LabelledImages, name: str, applied: AppliedLabelMap) -> b
     if name in sample.labels.scans:
         ids = sample.capture.clouds[name].points["category_id"]
         return bool((ids > 0).any())
+    tracks = None if sample.frame is None else sample.frame.tracks
+    if tracks is not None and name in tracks.sensors and tracks.sensors[name].visible.any():
+        return True
     truth: ImageTruth = applied.map_image(sample.truth[name])
     return any(
         seen.instance.annotated and seen.visible_px > 0 and not seen.ignored

@@ -54,6 +54,7 @@ def test_editors_know_both_spellings() -> None:
     assert names == {"enum": list(TABLE)}
     assert {m["$ref"].rpartition(".")[2] for m in mappings} == {
         "bev_map", "free_space", "grasps", "lanes", "language", "occupancy", "relations",
+        "tracks",
     }  # fmt: skip
 
 

@@ -21,6 +21,8 @@ from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core import capture, errors, interfaces, serialization
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
 from gen_data.core.scene import Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.streams import Streams
 from tests.streets import thin_street
 
 # All of them label one street, of which assets and kernels are made first.
@@ -40,11 +42,12 @@ FEW_PX = Thresholds(min_visible_px=1, min_box_px=1)
 
 @dataclass(frozen=True)
 class World:
-    """A sample's scene, one reading of it, and the assets of both."""
+    """A sample's scene, one reading of it, the assets of both, and the sequence that it is in."""
 
     scene: Scene
     reading: capture.SensorReading
     assets: interfaces.AssetLibrary
+    view: interfaces.ViewSequence
 
 
 @cache
@@ -54,7 +57,14 @@ def world() -> World:
     with open_pipeline(thin_street(CONFIG, *SMALL), channels) as pipeline:
         sample = pipeline.sample(1)
         (reading,) = sample.capture.readings.values()
-        return World(sample.scene, reading, pipeline.assets)
+        view = interfaces.ViewSequence(
+            lambda time_s: scene_at(sample.scene, time_s),
+            (0.0, 0.1, 0.2),
+            pipeline.assets,
+            pipeline.renderer,
+            Streams(1, 0, view=0),
+        )
+        return World(sample.scene, reading, pipeline.assets, view)
 
 
 def made(name: str) -> interfaces.AnyAnnotator:
@@ -64,7 +74,13 @@ def made(name: str) -> interfaces.AnyAnnotator:
 def annotated(name: str, of: World | None = None) -> tuple[ImageTruth, EgoTruth | None]:
     given = of or world()
     image = annotate_reading(given.scene, given.reading, [made(name)], FEW_PX, given.assets)
-    return image, annotate_ego({"": given.scene}, [made(name)], given.assets)
+    annotator = made(name)
+    frame = annotate_ego({"": given.scene}, [annotator], given.assets)
+    if frame is not None and isinstance(annotator, interfaces.SequenceAnnotator):
+        seen = capture.Capture({given.reading.sensor: given.reading})
+        begun = annotator.begin(given.view)
+        frame = annotator.annotate_step(given.view, begun, given.scene, seen, frame)
+    return image, frame
 
 
 def documented(truth: type) -> dict[str, set[str]]:
@@ -171,17 +187,20 @@ def test_an_empty_scene_has_empty_truth(name: str) -> None:
     given = world()
     nothing = {c: np.zeros_like(image) for c, image in given.reading.channels.items()}
     nothing |= {c: np.full_like(nothing[c], np.inf) for c in DISTANCES & nothing.keys()}
-    scene = Scene("empty", cameras=(given.reading.camera,))
-    reading = replace(given.reading, channels=nothing, silhouettes={})
+    camera = replace(given.reading.camera, rig="")
+    scene = Scene("empty", cameras=(camera,))
+    reading = replace(given.reading, camera=camera, channels=nothing, silhouettes={})
+    empty = World(scene, reading, given.assets, replace(given.view, at=lambda _: scene))
     if name in NEED_A_RIG:
         with pytest.raises(errors.ConfigError, match=f"annotation '{name}': the scene has no rig"):
-            annotated(name, World(scene, reading, given.assets))
+            annotated(name, empty)
         return
-    image, frame = annotated(name, World(scene, reading, given.assets))
+    image, frame = annotated(name, empty)
     assert image.objects == ()
     assert not image.borders
     assert image.free_space is None or not image.free_space.pixels.any()
     assert frame is None or not (frame.boxes3d or frame.borders or frame.birdseye)
+    assert frame is None or frame.tracks is None or not len(frame.tracks.instance_id)
 
 
 def test_images_are_annotated_as_a_whole_where_objects_are_not() -> None:

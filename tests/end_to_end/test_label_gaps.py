@@ -55,6 +55,17 @@ def test_a_camera_that_sees_nothing_is_named(tmp_path: Path) -> None:
     assert "0 labels in 5 images of camera 'left'" in row[0]
 
 
+def test_tracked_points_are_labels_without_any_other_annotation(tmp_path: Path) -> None:
+    sections = {"annotations": [{"type": "tracks", "points": 16}], "exporters": []}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", gen_data.ConfigWarning)
+        gen_data.generate(room(SEES, **sections), 1, out=tmp_path / "set", workers=0)
+    (sample,) = gen_data.open(tmp_path / "set")
+    assert sample.ego is not None
+    assert sample.ego.tracks is not None
+    assert sample.ego.tracks.sensors["color"].visible.any()
+
+
 def test_a_data_set_without_any_label_has_an_exit_code_of_its_own(tmp_path: Path) -> None:
     """9; it is finished, and the same command says so again."""
     (tmp_path / "c.yaml").write_text(yaml.safe_dump(room({**AWAY, "name": "left"})))

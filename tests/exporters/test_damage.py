@@ -17,7 +17,15 @@ import pytest
 from gen_data.core.boxes import BoxPx, OrientedBox
 from gen_data.core.capture import Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.motion import JointTrajectory
-from gen_data.core.sample import BirdseyeMap, EgoTruth, Grasp, ObjectTruth, Occupancy, Utterance
+from gen_data.core.sample import (
+    BirdseyeMap,
+    EgoTruth,
+    Grasp,
+    ObjectTruth,
+    Occupancy,
+    SensorTracks,
+    Utterance,
+)
 from gen_data.core.scene import Camera, Instance, Lane, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
@@ -51,6 +59,7 @@ from tests.exporters import (
     test_semantickitti,
     test_solo,
     test_tables,
+    test_tapvid,
     test_webdataset,
 )
 from tests.exporters.drives import drive_info
@@ -166,6 +175,7 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
     "surroundings": (everywhere(EgoTruth, boxes3d=everywhere(OrientedBox, size_m=narrow)),),
     "texts": (everywhere(Utterance, answer=lambda _: "many"),),
     "times": (everywhere(Scene, PointCloud, SensorReading, time_s=lambda t: 1.5 * t + 0.05),),
+    "tracks": (everywhere(SensorTracks, image_px=lambda p: p + 1, position_m=lambda p: -p),),
     "voxels": (everywhere(Occupancy, instance_id=lambda a: np.roll(a, 1, axis=0)),),
 }
 """Changed facts."""
@@ -254,6 +264,11 @@ def reach(world: Any) -> tuple[Any, Any]:
 def gridded(world: Any) -> tuple[Any, Any]:
     """The drive with occupancy."""
     return drive_info(world), test_occupancy.gridded(world)
+
+
+def tracked(world: Any) -> tuple[Any, Any]:
+    """The drive with points that are followed."""
+    return drive_info(world), test_tapvid.tracked(world)
 
 
 def slips(world: Any) -> tuple[Any, Any]:
@@ -353,6 +368,8 @@ ROWS = {
     "solo": row(street, "boxes, cameras, masks, solids", solo),
     "tables": row(scans, "measurements",
         test_tables.test_csv_holds_every_digit_that_counts_by_sequence),
+    "tapvid": row(tracked, "cameras, centres, photographs, tracks",
+        lambda m: test_tapvid.problems(m.folder, m.samples)),
     "tfrecord": row(few, "boxes, categories, masks", labels, masks="png"),
     "tum_rgbd": row(drive, "cameras, centres, depths, photographs, times",
         test_rgbd_sequences.test_tum_points_lie_on_the_scene_and_are_listed),

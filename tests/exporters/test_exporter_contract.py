@@ -11,6 +11,7 @@ from gen_data.exporters.label_map import LabelMap, MappedExporter
 from tests.exporters.drives import drive_info
 from tests.exporters.test_occupancy import gridded
 from tests.exporters.test_opendrive_export import town
+from tests.exporters.test_tapvid import tracked
 from tests.tiers import sampled
 
 PACKED = {"huggingface", "opendrive", "rlds", "tfrecord", "webdataset", "rerun"}
@@ -20,7 +21,8 @@ EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
 NO_CLASS = {"cityscapes", "hdf5", "kitti", "kitti_tracking", "language", "motchallenge"}
 """Formats with a mark for ignored objects that needs no class, or that only mention them."""
 OWN_IMAGES = PACKED | {
-    "hdf5", "lerobot", "mcap", "occupancy", "pointclouds", "semantickitti", "tables", "usd"
+    "hdf5", "lerobot", "mcap", "occupancy", "pointclouds", "semantickitti", "tables", "tapvid",
+    "usd",
 }  # fmt: skip
 """Formats without image files of the shards."""
 TRACKS = {"kitti_raw", "nuscenes"}
@@ -42,6 +44,8 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
         return drive_info(world), gridded(world)
     if exporter.type == "opendrive":
         return town(world)
+    if exporter.type == "tapvid":
+        return drive_info(world), tracked(world)
     if exporter.type == "bop":
         return world.info(7), world.with_bodies(world.samples)
     return world.info(7, lidars=("top",)), world.samples
