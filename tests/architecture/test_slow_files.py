@@ -1,0 +1,45 @@
+"""CI runs a third of the files with slow tests, and all that changed."""
+
+import subprocess
+from pathlib import Path
+
+from tests.slow_files import ROOT, changed_files, choose, marked_files
+
+FILES = [f"tests/test_{k}.py" for k in range(300)]
+
+
+def test_three_commits_that_follow_each_other_run_all_files_once() -> None:
+    shares = [choose(FILES, (), f"{number:040x}") for number in (6, 7, 8)]
+    assert sorted(file for share in shares for file in share) == sorted(FILES)
+    assert all(70 < len(share) < 130 for share in shares)
+
+
+def test_changed_files_run_whatever_the_commit() -> None:
+    others = ["tests/test_3.py", "generator/core/scene.py"]
+    for number in (6, 7, 8):
+        assert "tests/test_3.py" in choose(FILES, others, f"{number:040x}")
+        assert "generator/core/scene.py" not in choose(FILES, others, f"{number:040x}")
+
+
+def test_recent_changes_are_those_of_six_hours_before_the_commit(tmp_path: Path) -> None:
+    """Whenever CI runs."""
+    commands = [("init", "-q")]
+    for name, hour in (("old.py", 1), ("first.py", 6), ("second.py", 9)):
+        (tmp_path / name).write_text("")
+        commands += [("add", name), ("commit", "-q", "-m", name, f"2024-05-01T{hour:02}:00:00Z")]
+    for command in commands:
+        when = command[-1] if command[0] == "commit" else "2024-05-01T00:00:00Z"
+        arguments = command[:-1] if command[0] == "commit" else command
+        person = {f"GIT_{role}_{fact}": "a@b.c" for role in ("AUTHOR", "COMMITTER")
+                  for fact in ("NAME", "EMAIL")}  # fmt: skip
+        dates = {"GIT_AUTHOR_DATE": when, "GIT_COMMITTER_DATE": when}
+        environment = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), **person, **dates}
+        subprocess.run(["git", *arguments], cwd=tmp_path, check=True, env=environment)
+    assert sorted(changed_files(tmp_path)) == ["first.py", "second.py"]
+
+
+def test_files_with_marks_are_found() -> None:
+    found = marked_files(ROOT / "tests")
+    assert "tests/study/test_study.py" in found
+    assert "tests/contracts/test_every_draw.py" in found
+    assert "tests/sensors/test_faults.py" not in found

@@ -1,0 +1,47 @@
+"""Files with slow tests that CI runs for a commit: ``python -m tests.slow_files``.
+
+All slow tests together take longer than CI has. It runs a third of their files, which the commit
+decides, and all that changed within six hours of it: those of the same piece of work. Every file thus
+runs with each change of it, and else in every third run. ``python -m pytest -m slow`` runs all.
+"""
+
+import re
+import subprocess
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+MARKED = re.compile(r"mark\.slow|tests\.tiers|needs_open3d")
+SHARE = 3
+"""One file of so many runs although it did not change."""
+RECENT_S = 6 * 3600
+
+
+def marked_files(folder: Path) -> list[str]:
+    """Test files below a folder that may have slow tests, from its parent, in order."""
+    found = [path for path in folder.rglob("test_*.py") if MARKED.search(path.read_text("utf-8"))]
+    return sorted(path.relative_to(folder.parent).as_posix() for path in found)
+
+
+def choose(files: Iterable[str], changed: Iterable[str], commit: str) -> list[str]:
+    """The files of a commit's share, by their names, and the changed ones; ``commit`` is hex."""
+    turn, always = int(commit, 16) % SHARE, set(changed)
+    return [f for f in files if f in always or zlib.crc32(f.encode()) % SHARE == turn]
+
+
+def changed_files(root: Path) -> list[str]:
+    """Files that commits of the last hours before HEAD's changed, from the root."""
+    at_s = int(_git(root, "log", "-1", "--format=%ct"))
+    since = f"--since={at_s - RECENT_S}"
+    return _git(root, "log", since, "--name-only", "--format=", "HEAD").split()
+
+
+def _git(root: Path, *arguments: str) -> str:
+    done = subprocess.run(["git", *arguments], cwd=root, check=True, capture_output=True, text=True)
+    return done.stdout
+
+
+if __name__ == "__main__":
+    head = _git(ROOT, "rev-parse", "HEAD").strip()
+    print(*choose(marked_files(ROOT / "tests"), changed_files(ROOT), head), sep="\n")
