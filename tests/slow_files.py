@@ -1,7 +1,7 @@
 """Files with slow tests that CI runs for a commit: ``python -m tests.slow_files``.
 
 All slow tests together take longer than CI has. It runs a third of their files, which the commit
-decides, and all that changed within six hours of it: those of the same piece of work. Every file thus
+decides, and all that changed within six hours of it: those of the same piece of work. So a file
 runs with each change of it, and else in every third run. ``python -m pytest -m slow`` runs all.
 """
 
