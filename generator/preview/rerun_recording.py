@@ -137,10 +137,12 @@ class Recorder:
 
     def _record_faults(self, capture: Capture) -> None:
         """Log the true faults of all readings that have some, as text."""
-        readings = {**capture.readings, **capture.clouds, **capture.tables}
-        for name, reading in sorted(readings.items()):
-            if reading.faults:
-                text = serialization.canonical_json(reading.faults)
+        faults = {name: reading.faults for name, reading in capture.readings.items()}
+        faults |= {name: cloud.faults for name, cloud in capture.clouds.items()}
+        faults |= {name: table.faults for name, table in capture.tables.items()}
+        for name, found in sorted(faults.items()):
+            if found:
+                text = serialization.canonical_json(found)
                 self.stream.log(f"faults/{name}", rr.TextDocument(text))
 
     def _set_time(self, sample: Sample, time_s: float) -> None:

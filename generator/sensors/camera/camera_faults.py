@@ -119,7 +119,7 @@ class DrawnCameraFaults:
             # Full in the inner half, none at the rim: the window is out of focus.
             edge = np.clip(2.0 - 2.0 * far, 0.0, 1.0)
             passed[window] *= (1.0 - share * edge * edge * (3.0 - 2.0 * edge)).astype(np.float32)
-        return np.float32(1.0) - passed
+        return np.asarray(np.float32(1.0) - passed, np.float32)
 
     def spoil(self, reading: SensorReading) -> SensorReading:
         """The reading with dead pixels and lines in its photograph, and a record of all faults."""
@@ -151,7 +151,7 @@ class DrawnCameraFaults:
 class _Raised:
     """A distribution whose values are higher by a constant."""
 
-    drawn: Distribution
+    drawn: Distribution[float]
     by: float
 
     def draw(self, rng: Rng) -> float:
