@@ -120,6 +120,46 @@ def test_controls_and_layers_change_the_pictures(page: Page) -> None:
         )
 
 
+def test_sliders_follow_a_text_that_is_typed(page: Page) -> None:
+    """Key by key, also beyond their ends; then a key on one thumb keeps the value of the other."""
+    put_cursor(page, "count: 3")
+    slider = page.locator("[data-field=scale] .q-slider")
+    slider.wait_for()
+    page.keyboard.type(", scale: {uniform: [0.9, 1.2")
+    page.wait_for_selector("[data-field=scale] [aria-valuenow='0.9|1.2']")
+    slider.locator(".q-slider__thumb").first.press("ArrowRight")
+    page.wait_for_function(
+        "document.querySelector('.cm-content').textContent.includes('{uniform: [0.91, 1.2]}')"
+    )
+    put_cursor(page, "[0.91, 1.2")
+    page.keyboard.type("5")
+    page.wait_for_selector("[data-field=scale] [aria-valuenow='0.91|1.25']")
+    put_cursor(page, "[0.91, 1")
+    page.keyboard.type("7")
+    page.wait_for_selector("[data-field=scale] [aria-valuenow='0.91|17.25']")
+    assert float(slider.get_attribute("aria-valuemax") or 0) >= 17.25
+    # A number that is typed next to a slider goes into the text, too.
+    count = page.locator("[data-field=count] input")
+    count.fill("21")
+    page.wait_for_function(
+        "document.querySelector('.cm-content').textContent.includes('count: 21,')"
+    )
+    assert float(page.locator("[data-field=count] .q-slider").get_attribute("aria-valuemax")) >= 21
+
+
+def test_controls_do_not_overwrite_a_text_with_faults(page: Page) -> None:
+    """They show the latest valid text: the message asks to correct the other."""
+    put_cursor(page, "count: 3")
+    slider = page.locator("[data-field=scale] .q-slider")
+    slider.wait_for()
+    page.keyboard.type(", cuont: 1")
+    page.wait_for_selector(".gd-fault:has-text('cuont')")
+    text = text_of(page)
+    slider.locator("[tabindex]").press("ArrowRight")
+    page.wait_for_selector(".q-notification:has-text('the text has faults')")
+    assert text_of(page) == text
+
+
 def test_each_view_has_the_pictures_that_the_library_draws(live: Live, page: Page) -> None:
     """Depth, normals, and keypoints and 3D boxes on the photograph, in the order of the tiles."""
     studio, start = Studio(), View()
