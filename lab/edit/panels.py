@@ -20,6 +20,7 @@ from gen_data.lab.edit import controls, statistics
 from gen_data.lab.edit.document import list_origins
 from gen_data.lab.edit.samples import Recording
 from gen_data.lab.edit.session import drawn_values, vary
+from gen_data.lab.matching.match import LEAST, SCENES
 
 if TYPE_CHECKING:
     from gen_data.lab.edit.desk import Desk
@@ -324,8 +325,15 @@ class StatisticsPanel:
         self._real: statistics.Summary | None = None
         self._note = ui.label("")
         if tab.desk.real is not None:
-            ui.button("Fit to the real pictures", on_click=self._fit).props("dense no-caps outline")
+            with ui.element("div").classes("gd-row"):
+                ui.button("Fit to the real pictures", on_click=self._fit).props(
+                    "dense no-caps outline"
+                )
+                self._scenes = ui.number(
+                    "scenes to simulate", value=SCENES, min=LEAST, step=1, precision=0
+                ).props('dense data-fit="scenes"')
             self._progress = ui.label("").props('role="status"')
+            self._result = ui.element("div")
             ui.timer(0.0, self._read, once=True)
         self._body = ui.element("div").classes("gd-table")
 
@@ -347,11 +355,16 @@ class StatisticsPanel:
             f"brightness (mean grey value, 0 to 1): {', '.join(lights)}" if lights else ""
         )
         header = ["class"]
+        if self._real and not self._real.classes:
+            # Columns without labels would be blank.
+            self._note.text += f"; no labels found in {self._tab.desk.real}"
+            sides.pop()
         for name, side in sides:
             header += [f"{name} ({side.pictures}): boxes per picture", "median px", "occlusion"]
         self._body.clear()
         with self._body:
-            table(tuple(header), statistics.rows(ours, self._real)[:60])
+            real = self._real if len(sides) > 1 else None
+            table(tuple(header), statistics.rows(ours, real)[:60])
 
     async def _fit(self) -> None:
         """Run the command match on the saved file; its result is a file that extends it."""
@@ -370,6 +383,8 @@ class StatisticsPanel:
             str(path),
             "--out",
             str(out),
+            "--scenes",
+            str(int(self._scenes.value or SCENES)),
         )
         self._progress.text = "fitting; this takes some minutes ..."
         process = await asyncio.create_subprocess_exec(
@@ -380,7 +395,8 @@ class StatisticsPanel:
             self._progress.text = said.decode(errors="replace").strip()[-500:]
             return
         self._progress.text = f"wrote {out.name}, its report {out.with_suffix('.html').name}"
-        with self._note.parent_slot or self._body:
+        self._result.clear()
+        with self._result:
             ui.link(f"open {out.name}", f"/?open={quote(str(out))}")
 
 
@@ -441,10 +457,11 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
             state = ui.label("rendering ...")
         with ui.element("div").classes("gd-table"):
             table(
-                ("category", "size px", "occlusion"),
+                ("class", "object", "size px", "occlusion"),
                 [
                     (
                         o.category,
+                        o.name,
                         f"{o.width_px:.0f} x {o.height_px:.0f}",
                         "" if o.occlusion is None else f"{o.occlusion:.2f}",
                     )

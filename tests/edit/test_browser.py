@@ -189,6 +189,50 @@ def test_each_view_has_the_pictures_that_the_library_draws(live: Live, page: Pag
         expect(replace(start, layers=layers), partial(page.click, f"[data-layer={layer}]"))
 
 
+def test_a_scanner_has_its_view_from_above(live: Live, page: Page) -> None:
+    """The pictures that the library draws of the same sweeps."""
+    text = LINES.replace(", sensors: [pseudo_lidar]", "")
+    before = page.evaluate(COUNTS)
+    set_text(page, text)
+    wait_for_pictures(page, before)
+    before = page.evaluate(COUNTS)
+    page.click("label:has-text('picture') >> nth=0")
+    page.click(".q-item:has-text('LiDAR from above')")
+    wait_for_pictures(page, before)
+    page.wait_for_function(DRAWN)
+    studio, order = Studio(), Order(text, str(live.folder / "mine.yaml"), 0, View("scan"))
+    shown = [studio.show(replace(order, index=k)) for k in range(4)]
+    assert {one.sensors["pseudo_lidar"] for one in shown} == {"scan"}
+    assert pictures(page) == [one.jpeg for one in shown]
+    page.click("label:has-text('picture') >> nth=0")
+    page.click(".q-item:has-text('photograph')")
+
+
+def test_a_text_is_saved_under_another_name(live: Live, page: Page) -> None:
+    """Which the page then has; the first file stays, and names that are taken are refused."""
+    with live.tab("?open=mine.yaml") as other:
+        other.wait_for_selector(".gd-tile")
+        saved = live.read()
+        expected = text_of(other).replace("# My table", "# My table, again")
+        type_behind(other, "# My table", ", again")
+        for name, told in (("mine.yaml", "is there"), ("../x.yaml", "outside of the folders")):
+            other.click("button:has-text('Save as')")
+            other.fill("input[aria-label=File]", name)
+            other.press("input[aria-label=File]", "Enter")
+            other.wait_for_selector(f".q-notification:has-text('{told}')")
+            other.keyboard.press("Escape")
+            other.wait_for_selector(".q-dialog", state="detached")
+        other.click("button:has-text('Save as')")
+        other.fill("input[aria-label=File]", "copy.yaml")
+        other.click(".q-dialog button:has-text('Save')")
+        other.wait_for_selector(".gd-title:text-is('copy.yaml')")
+        assert other.url.endswith("?open=copy.yaml")
+        assert text_of(other) == expected
+        assert (live.folder / "copy.yaml").read_text() == expected
+        assert live.read() == saved
+    (live.folder / "copy.yaml").unlink()
+
+
 def test_a_sample_in_full_size_has_its_draws_and_a_recording(page: Page) -> None:
     """The recording is a file for the Rerun viewer."""
     page.click(".gd-tile >> nth=1")
