@@ -143,7 +143,9 @@ class PipelineFactory:
     def __getstate__(self) -> dict[str, object]:
         """Pickle the categories, because finding them takes a second."""
         categories = self.categories
-        state = {k: v for k, v in self.__dict__.items() if k not in ("library", "nominal")}
+        state = {
+            k: v for k, v in self.__dict__.items() if k not in ("library", "nominal", "renderer")
+        }
         return {**state, "categories": categories}
 
 

@@ -25,7 +25,7 @@ ASSUMED = (
 SHORTENED = "\nthe ground ends below the horizon: if the grid is tilted, change 'looks down'"
 HEIGHT_HINT = "of the lens; small squares of the grid are 0.1 m"
 TILT_HINT = "0: level; 30: from a chair; 60: standing at the table"
-HFOV_HINT = "across the width: 65 for a phone held level, 51 upright"
+HFOV_HINT = "phones: 65 held level, 51 upright"
 REACH = 0.2
 """Distance from a corner at which it is taken, as a share of the picture's edges."""
 HANDLE = (
