@@ -223,6 +223,7 @@ class ControlsPanel:
             for option in control.options:
                 chips[option] = ui.chip(
                     str(option),
+                    color=None,
                     selectable=True,
                     selected=option in chosen,
                     on_selection_change=partial(toggle, option),
