@@ -31,12 +31,6 @@ from gen_data.sensors.mounting import check_not_buried, stride, within_steps
 NOMINAL_SCENES_KEPT = 32
 
 
-def _open_renderer(config: Config, library: Library) -> interfaces.Renderer:
-    """Open the renderer. Raises ConfigError, with its place, if this machine lacks the device."""
-    with located_errors(config.document):
-        return config.render.open(library)
-
-
 @dataclass(frozen=True)
 class PipelineFactory:
     """Makes the same Pipeline in any process; picklable.
@@ -63,13 +57,23 @@ class PipelineFactory:
             resolved,
             library,
             open_physics=partial(open_engine, library, config.general.physics),
-            open_renderer=partial(_open_renderer, config, library),
+            open_renderer=lambda: self.renderer,
         )
 
     @cached_property
     def library(self) -> Library:
         """Assets, of this process: opening them takes as long as building a simple scene."""
         return open_assets(self.config.asset_folders)
+
+    @cached_property
+    def renderer(self) -> interfaces.Renderer:
+        """Renderer of this process, which keeps what it has uploaded of the assets.
+
+        Raises:
+            ConfigError: this machine lacks the device; the message has its place.
+        """
+        with located_errors(self.config.document):
+            return self.config.render.open(self.library)
 
     @cached_property
     def nominal(self) -> tuple[Scene, ...]:
@@ -139,7 +143,9 @@ class PipelineFactory:
     def __getstate__(self) -> dict[str, object]:
         """Pickle the categories, because finding them takes a second."""
         categories = self.categories
-        state = {k: v for k, v in self.__dict__.items() if k not in ("library", "nominal")}
+        state = {
+            k: v for k, v in self.__dict__.items() if k not in ("library", "nominal", "renderer")
+        }
         return {**state, "categories": categories}
 
 

@@ -9,6 +9,7 @@ from gen_data.assets import asset_arrays, asset_cache, drape, family_parameters,
 from gen_data.assets.asset_ids import AssetId, ParameterValue, format_parameter
 from gen_data.assets.families import AnyFamily, kind_of, own_families, third_party_families
 from gen_data.assets.family import EnvironmentFamily, Facts, Family, TextureFamily
+from gen_data.core import activity
 from gen_data.core.asset_types import Asset, Float32, Symmetry, TextureData
 from gen_data.core.bounded_cache import CountCache, Sized
 from gen_data.core.errors import AssetError, did_you_mean
@@ -219,6 +220,7 @@ def _list_symmetries(asset_id: AssetId, family: AnyFamily) -> tuple[Symmetry, ..
 
 
 def _make(asset_id: AssetId, family: AnyFamily) -> Any:
+    activity.tell(f"making {asset_id}")
     return _make_and_list(asset_id, family)[0]
 
 

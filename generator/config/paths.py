@@ -79,10 +79,9 @@ def _error(position: Position | None, field: str, fact: str) -> errors.ConfigErr
 
 
 def _base_folder(position: Position | None) -> Path:
-    if position is None or not Path(position.file).is_file():
-        return Path()
-    file = Path(position.file)
-    return Path() if file.name == PLAN else file.parent
+    file = Path() if position is None else Path(position.file)
+    # A text that is not saved yet has a folder, too.
+    return file.parent if file.name != PLAN and file.parent.is_dir() else Path()
 
 
 def write_locations(run_dir: Path, folders: Mapping[str, Path]) -> None:

@@ -9,6 +9,8 @@ from gen_data.core import asset_types, plates, se3
 from gen_data.preview.overlay import Image
 
 _HORIZON, _CORNERS, _GRID, _LANE = (255, 60, 60), (255, 220, 0), (0, 220, 255), (120, 255, 80)
+_OUTLINE = (10, 25, 35)
+"""Around all lines: they are seen on dark and on bright ground."""
 _LINES_MAX = 60
 """Lines of the grid along each axis; larger grounds get a grid of several metres."""
 _SMALL_M, _FINE_M = 4.0, 0.1
@@ -22,13 +24,16 @@ def plate_overlay(plate: plates.Plate, rgb: asset_types.UInt8) -> Image:
     """The photograph, uint8 [h, w, 3], with its estimated or given geometry drawn on it."""
     image = rgb.copy()
     width = max(1, round(max(plate.size_px) / 500))
-    for line in _grid_lines(plate):
-        _draw(image, line, _GRID, max(width // 2, 1))
-    corners = np.array([*plate.ground_px, plate.ground_px[0]])
-    _draw(image, corners, _CORNERS, width)
-    for lane in plate.lanes:
-        _draw(image, _project(plate, np.array(lane.center_m)), _LANE, width)
-    _draw(image, np.array(plates.horizon_px(plate)), _HORIZON, width)
+    lines = []
+    if plate.ground_px:
+        lines += [(line, _GRID) for line in _grid_lines(plate)]
+        lines.append((np.array([*plate.ground_px, plate.ground_px[0]]), _CORNERS))
+    lines += [(_project(plate, np.array(lane.center_m)), _LANE) for lane in plate.lanes]
+    lines.append((np.array(plates.horizon_px(plate)), _HORIZON))
+    for line, _ in lines:
+        _draw(image, line, _OUTLINE, width + 2 * max(1, width // 3))
+    for line, color in lines:
+        _draw(image, line, color, width)
     return np.asarray(image, np.uint8)
 
 

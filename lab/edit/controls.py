@@ -180,6 +180,7 @@ def _extent(
     whole = whole or any(one.schema.get("type") == "integer" for one in field.branches)
     step = 1.0 if whole else 10.0 ** math.floor(math.log10(max(high - low, 1e-6) / 100.0))
     low = low + step if limits is not None and limits.open_low and low == limits.low else low
+    low = round(math.ceil(low / step - 1e-9) * step, 12)  # Sliders count steps from there.
     high = high - step if limits is not None and limits.open_high and high == limits.high else high
     return min([low, *numbers]), max([high, *numbers]), step
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gen_data.lab.edit.files import Folders
-from gen_data.lab.edit.workers import Job, Ticket, Workers
+from gen_data.lab.edit.workers import Activity, Job, Ticket, Workers
 
 PICTURES_BYTES = 96 << 20
 """Encoded pictures that are kept for browsers."""
@@ -43,6 +43,8 @@ class Desk:
         real: Folder of real pictures; None without one.
         gallery: Pictures of shipped configurations by file name.
         listeners: Receivers of results by client of the workers.
+        schema: Loads all plug-ins, which takes seconds and must not hold up the page.
+        hearers: Receivers of the activities for a client.
     """
 
     folders: Folders
@@ -52,6 +54,8 @@ class Desk:
     pictures: Pictures = field(default_factory=Pictures)
     gallery: dict[str, bytes] = field(default_factory=dict)
     listeners: dict[str, Callable[[Ticket, Any], None]] = field(default_factory=dict)
+    hearers: dict[str, Callable[[Activity], None]] = field(default_factory=dict)
+    schema: asyncio.Task[Any] | None = None
     loop: asyncio.AbstractEventLoop | None = None
     workers: Workers | None = None
 
@@ -60,6 +64,12 @@ class Desk:
         listener = self.listeners.get(ticket.client)
         if listener is not None and self.loop is not None and not self.loop.is_closed():
             self.loop.call_soon_threadsafe(listener, ticket, result)
+
+    def hear(self, ticket: Ticket, activity: Activity) -> None:
+        """Hand an activity to the tab that waits for it, in the loop of the server."""
+        hearer = self.hearers.get(ticket.client)
+        if hearer is not None and self.loop is not None and not self.loop.is_closed():
+            self.loop.call_soon_threadsafe(hearer, activity)
 
     def order(
         self, client: str, jobs: Sequence[Job], receive: Callable[[Ticket, Any], None]
@@ -72,6 +82,7 @@ class Desk:
     def forget(self, key: str) -> None:
         """Drop the jobs of all clients of a tab."""
         assert self.workers is not None
+        self.hearers.pop(key, None)
         for client in [name for name in self.listeners if name.startswith(key)]:
             del self.listeners[client]
             self.workers.submit(client, ())

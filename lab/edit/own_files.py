@@ -6,8 +6,9 @@ or the walls of its room. Both are copied to ``assets/`` next to the configurati
 
 from __future__ import annotations
 
+import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath, PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -15,27 +16,33 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
+from gen_data.assets.folder_index import PlateEntry
+from gen_data.assets.plates.plate_import import locate_camera
 from gen_data.config.merging import node_name
 from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.plates import Plate, ground_points
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.core.whole_files import write_whole
 from gen_data.lab.edit import photographs, text_edits
 from gen_data.lab.edit.files import read_file
 from gen_data.lab.edit.photographs import Standpoint
+from gen_data.lab.edit.samples import encode
+from gen_data.preview.plate_overlay import plate_overlay
 
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
     from gen_data.assets.checking import Finding
     from gen_data.assets.library import Library
     from gen_data.lab.edit.samples import Studio
+    from gen_data.preview.overlay import Image
 
 ASSETS = "assets"
 """Folder of the user's files, next to the configuration."""
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".webp"})
 SIZE_MAX_BYTES = 200_000_000
 """Larger files are copied to the folder by hand: a browser reads them into memory."""
-PICTURE_PX = 480
-"""Longest edge of the picture of a checked file."""
+PICTURE_PX, PHOTO_PX = 480, 720
+"""Longest edge of the picture of a checked mesh, and of a photograph."""
 PERSON, MUG = "simple_person?seed=0", "mug?seed=0"
 PERSON_FROM_M = 0.4
 """Longest edge from which a person stands next to an object, not only a mug."""
@@ -63,6 +70,21 @@ class Checked:
 
 
 @dataclass(frozen=True)
+class Misplaced:
+    """A photograph whose ground cannot be used as it is.
+
+    Attributes:
+        text: Reason, and the control that changes it with the value that it needs.
+        jpeg: Picture with the horizon, and a grid on the part of the ground below it.
+    """
+
+    text: str
+    jpeg: bytes
+    size_px: tuple[int, int]
+    standpoint: Standpoint
+
+
+@dataclass(frozen=True)
 class CheckFile:
     """Check of one file in a process of its own limits.
 
@@ -75,7 +97,7 @@ class CheckFile:
     entry: tuple[tuple[str, Any], ...] = ()
     standpoint: Standpoint = photographs.UNKNOWN
 
-    def run(self, studio: Studio) -> Checked:
+    def run(self, studio: Studio) -> Checked | Misplaced:
         """Import the file as a run would, in a folder of its own."""
         del studio
         with temporary_folder("edit") as folder:
@@ -117,24 +139,59 @@ def check_mesh(folder: Path, name: str, changes: dict[str, Any]) -> Checked:
     return checked
 
 
-def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked:
+def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked | Misplaced:
     """Check a photograph in a folder without an index, which is written.
 
-    Without a tilt, its horizon is found from its edges; where it has none, a tilt is assumed.
+    Without a tilt, its horizon is found from its edges; where they show none, or one below all
+    ground, a tilt is assumed. A ground that was not given ends below the horizon.
 
     Raises:
         AssetError: it cannot be used; the text tells why.
     """
+    from gen_data.assets.image_decoding import decode_image
+
     data = (folder / name).read_bytes()
-    size_px = photographs.upright_size_px(data, name)
+    rgb = decode_image(data, name)
+    size_px = rgb.shape[1], rgb.shape[0]
+
+    def locate(one: Standpoint) -> Plate:
+        entry = PlateEntry.model_validate_json(json.dumps(one.entry(name, data, size_px)))
+        return locate_camera(entry, data, rgb, name)
+
+    plate, standpoint = _with_ground(locate, standpoint)
     try:
         checked = _check(folder, "plates", standpoint.entry(name, data, size_px))
+    except AssetError as error:
+        ground = standpoint.ground or photographs.GROUND
+        lowered = photographs.below_horizon(plate, ground)
+        is_below = np.isfinite(ground_points(plate, np.array(plate.ground_px))).all()
+        text = str(error) if is_below else f"{name}: {photographs.remedy(plate, ground)}"
+        shown_px = [(x * size_px[0], y * size_px[1]) for x, y in lowered or ()]
+        jpeg = encode(_shrink(plate_overlay(replace(plate, ground_px=tuple(shown_px)), rgb)))
+        return Misplaced(text, jpeg, size_px, standpoint)
+    return replace(checked, size_px=size_px, standpoint=standpoint)
+
+
+def _with_ground(
+    locate: Callable[[Standpoint], Plate], standpoint: Standpoint
+) -> tuple[Plate, Standpoint]:
+    """A photograph's camera, and the standpoint with a tilt and a ground where it needs them."""
+    try:
+        plate = locate(standpoint)
     except AssetError as error:
         if standpoint.tilt_deg is not None or "no horizon was found" not in str(error):
             raise
         standpoint = standpoint.tilted()
-        checked = _check(folder, "plates", standpoint.entry(name, data, size_px))
-    return replace(checked, size_px=size_px, standpoint=standpoint)
+        plate = locate(standpoint)
+    if standpoint.ground is not None:
+        return plate, standpoint
+    lowered = photographs.below_horizon(plate, photographs.GROUND)
+    rows = [y for _, y in lowered or ()]
+    if rows and max(rows) - min(rows) >= photographs.LEAST_GROUND:
+        return plate, replace(standpoint, ground=lowered)
+    if standpoint.tilt_deg is None:
+        return _with_ground(locate, standpoint.tilted())
+    return plate, standpoint
 
 
 def _check(folder: Path, section: str, entry: dict[str, Any]) -> Checked:
@@ -174,18 +231,13 @@ def _write_index(folder: Path, section: str, entry: dict[str, Any]) -> None:
 def _picture(finding: Finding, library: Library) -> bytes:
     from gen_data.core.scene import Body
     from gen_data.core.se3 import SE3
-    from gen_data.lab.edit.samples import encode
-    from gen_data.preview.plate_overlay import plate_overlay
     from gen_data.preview.thumbnails import picture_of
     from gen_data.renderers.warp.renderer import WarpRenderer
     from gen_data.renderers.warp.settings import RenderSettings
 
     if finding.size_m is None:
         photo = library.texture(finding.asset_id).albedo
-        image = plate_overlay(library.plate(finding.asset_id), photo)
-        scale = PICTURE_PX / max(image.shape[:2])
-        size_px = [max(1, round(edge * scale)) for edge in image.shape[1::-1]]
-        return encode(np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_AREA)))
+        return encode(_shrink(plate_overlay(library.plate(finding.asset_id), photo)))
     renderer = WarpRenderer(library, "auto", RenderSettings())
     names = [finding.asset_id, MUG, *([PERSON] if max(finding.size_m) > PERSON_FROM_M else [])]
     bodies, y_m = [], 0.0
@@ -197,6 +249,12 @@ def _picture(finding: Finding, library: Library) -> bytes:
         bodies.append(Body(name, name, SE3(place)))
         y_m += high[1] - low[1] + gap_m
     return encode(picture_of(tuple(bodies), library, renderer, PICTURE_PX))
+
+
+def _shrink(image: Image) -> Image:
+    scale = PHOTO_PX / max(image.shape[:2])
+    size_px = [max(1, round(edge * scale)) for edge in image.shape[1::-1]]
+    return np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_AREA))
 
 
 def keep_file(folder: Path, path: Path, checked: Checked) -> None:

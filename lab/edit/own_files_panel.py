@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import tempfile
 from dataclasses import replace
 from functools import partial
@@ -13,7 +14,7 @@ from nicegui import ui
 
 from gen_data.core.errors import ConfigError, GenDataError
 from gen_data.lab.edit import own_files
-from gen_data.lab.edit.photographs import UNKNOWN
+from gen_data.lab.edit.photographs import GROUND, UNKNOWN, Corners, Standpoint, rectangle
 
 if TYPE_CHECKING:
     from gen_data.lab.edit.panels import Tab
@@ -21,6 +22,17 @@ if TYPE_CHECKING:
 ASSUMED = (
     "\nno horizon was found: change 'looks down' until the grid lies on the table or the ground"
 )
+SHORTENED = "\nthe ground ends below the horizon: if the grid is tilted, change 'looks down'"
+HEIGHT_HINT = "of the lens; small squares of the grid are 0.1 m"
+TILT_HINT = "0: level; 30: from a chair; 60: standing at the table"
+HFOV_HINT = "phones: 65 held level, 51 upright"
+REACH = 0.2
+"""Distance from a corner at which it is taken, as a share of the picture's edges."""
+HANDLE = (
+    '<circle cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}" fill="#ffdc00" stroke="#0a1923" '
+    'stroke-width="{w:.1f}" /><circle cx="{x:.1f}" cy="{y:.1f}" r="{w:.1f}" fill="#0a1923" />'
+)
+AREA = '<polygon points="{points}" fill="none" stroke="#ffdc00" stroke-width="{w:.1f}" />'
 
 
 class OwnFilesPanel:
@@ -69,40 +81,72 @@ class OwnFile:
         self._tab, self._path = tab, path
         self._found: own_files.Checked | None = None
         self._standpoint = UNKNOWN
+        self._corners: Corners = GROUND
+        self._size_px = (own_files.PHOTO_PX, own_files.PHOTO_PX)
+        self._taken: int | None = None
+        self._is_checked = asyncio.Event()
+        self._is_seen = False
+        self._ranges: list[Any] = []
         self._card = ui.element("div").classes("gd-field")
         self._card.props["data-file"] = path.name
         with self._card:
             ui.label(path.name).classes("gd-name")
-            self._image = ui.element("img").classes("gd-own")
-            self._image.props["alt"] = f"check of {path.name}"
+            self._image = ui.interactive_image(
+                on_mouse=self._drag, events=["mousedown", "mousemove", "mouseup"], sanitize=False
+            ).classes("gd-own gd-draggable" if own_files.is_photograph(path.name) else "gd-own")
+            self._image.on("loaded", self._scroll)
+            self._image.props["role"] = "img"
+            self._image.props["aria-label"] = f"check of {path.name}"
             self._image.set_visibility(False)
             self._facts = ui.label("being checked ...").props('role="status"')
             self._choices = ui.element("div")
         self._check(own_files.CheckFile(path))
 
     def _check(self, job: own_files.CheckFile) -> None:
+        self._is_checked.clear()
         self._tab.desk.order(f"{self._tab.key}/file/{self._path}", [job], self._show)
 
     def _show(self, ticket: Any, found: Any) -> None:
         self._tab.desk.listeners.pop(ticket.client, None)
-        is_checked = isinstance(found, own_files.Checked)
-        self._facts.classes(add="" if is_checked else "gd-refused")
-        self._facts.classes(remove="gd-refused" if is_checked else "")
-        self._image.set_visibility(is_checked)
-        if not is_checked:
-            self._facts.text = found.text
-            self._found = None
-            if own_files.is_photograph(self._path.name):
-                self._build_choices()
-            return
-        self._image.props["src"] = self._tab.desk.pictures.put(found.jpeg)
-        self._image.update()
-        is_assumed = found.standpoint.tilt_deg is not None and self._standpoint.tilt_deg is None
-        self._facts.text = describe(found) + (ASSUMED if is_assumed else "")
-        if is_assumed and not self._choices.default_slot.children:
-            self._standpoint = found.standpoint
-        self._found = found
-        self._build_choices()
+        self._found = found if isinstance(found, own_files.Checked) else None
+        self._is_checked.set()
+        has_picture = isinstance(found, own_files.Checked | own_files.Misplaced)
+        self._facts.classes(add="" if self._found else "gd-refused")
+        self._facts.classes(remove="gd-refused" if self._found else "")
+        self._image.set_visibility(has_picture)
+        self._facts.text = describe(found) if self._found else found.text
+        if has_picture:
+            self._image.set_source(self._tab.desk.pictures.put(found.jpeg))
+        is_photograph = own_files.is_photograph(self._path.name)
+        if has_picture and found.size_px is not None:
+            scale = own_files.PHOTO_PX / max(found.size_px)
+            self._size_px = (scale * found.size_px[0], scale * found.size_px[1])
+            self._take_over(found.standpoint)
+        if self._found or is_photograph:
+            self._build_choices()
+        if not has_picture:
+            self._scroll()
+
+    def _take_over(self, used: Standpoint) -> None:
+        """Show the tilt and the ground that a check has assumed."""
+        given = self._standpoint
+        if self._found and used.tilt_deg != given.tilt_deg:
+            self._facts.text += ASSUMED
+        elif self._found and given.ground is None and used.ground not in (None, GROUND):
+            self._facts.text += SHORTENED
+        if not self._choices.default_slot.children:
+            self._standpoint = replace(given, tilt_deg=used.tilt_deg)
+        if self._taken is None:
+            self._corners = used.ground or GROUND
+            self._draw_corners()
+            for axis, one in enumerate(self._ranges):
+                one.value = self._extent(axis)
+
+    def _scroll(self) -> None:
+        """Bring the card into view, once: it may begin below the edge of the window."""
+        if not self._is_seen:
+            self._is_seen = True
+            self._tab.client.run_javascript(f"getHtmlElement({self._card.id})?.scrollIntoView()")
 
     def _build_choices(self) -> None:
         """What may be changed, once: a slider must not be replaced under the hand."""
@@ -140,28 +184,71 @@ class OwnFile:
     def _build_standpoint(self) -> None:
         now = self._standpoint
         with ui.element("div").classes("gd-row"):
-            for field, label, value in (
-                ("height_m", "camera above table or ground [m]", now.height_m),
-                ("tilt_deg", "looks down [deg], empty: from edges", now.tilt_deg),
-                ("hfov_deg", "field of view across [deg], empty: EXIF", now.hfov_deg),
+            for field, label, hint, value in (
+                ("height_m", "camera above table or ground [m]", HEIGHT_HINT, now.height_m),
+                ("tilt_deg", "looks down [deg], empty: from edges", TILT_HINT, now.tilt_deg),
+                ("hfov_deg", "field of view across [deg], empty: EXIF", HFOV_HINT, now.hfov_deg),
             ):
-                ui.number(
+                number = ui.number(
                     label, value=value, on_change=lambda e, field=field: self._stand(field, e.value)
-                ).props(f'dense debounce=300 data-standpoint="{field}"').style("width: 250px")
-        for field, label, share in (
-            ("across", "ground from left to right [%]", now.across),
-            ("down", "ground from top to bottom [%]", now.down),
+                ).props(f'dense debounce=300 data-standpoint="{field}"')
+                number.style("width: 250px").props["hint"] = hint
+        for axis, label in enumerate(
+            ("ground from left to right [%]", "ground from top to bottom [%]")
         ):
             ui.label(label)
-            ends = dict(zip(("min", "max"), (100.0 * one for one in share), strict=True))
-            ui.range(
-                min=0,
-                max=100,
-                value=ends,
-                on_change=lambda e, field=field: self._stand(
-                    field, (0.01 * e.value["min"], 0.01 * e.value["max"])
-                ),
-            ).props(f'label dense aria-label="{label}" data-standpoint="{field}"')
+            self._ranges.append(
+                ui.range(min=0, max=100, value=self._extent(axis))
+                .props(f'label dense aria-label="{label}"')
+                .on(
+                    "update:model-value",
+                    partial(self._slide, axis),
+                    throttle=0.2,
+                    leading_events=False,
+                )
+            )
+
+    def _extent(self, axis: int) -> dict[str, float]:
+        """Ends of the ground's corners along an axis [%]."""
+        shares = [100.0 * corner[axis] for corner in self._corners]
+        return {"min": round(min(shares)), "max": round(max(shares))}
+
+    def _slide(self, axis: int, event: Any) -> None:
+        """Make the ground the rectangle of the sliders."""
+        ends = [self._extent(0), self._extent(1)]
+        ends[axis] = event.args
+        across, down = ((0.01 * one["min"], 0.01 * one["max"]) for one in ends)
+        self._stand("ground", rectangle(across, down))
+
+    def _drag(self, event: Any) -> None:
+        """Move the corner that the pointer has taken."""
+        if not own_files.is_photograph(self._path.name):
+            return
+        width, height = self._size_px
+        x, y = (
+            min(max(share, 0.0), 1.0) for share in (event.image_x / width, event.image_y / height)
+        )
+        if event.type == "mousedown":
+            far = [math.hypot(a - x, b - y) for a, b in self._corners]
+            self._taken = far.index(min(far)) if min(far) < REACH else None
+        elif self._taken is not None:
+            moved = list(self._corners)
+            moved[self._taken] = (x, y)
+            self._corners = tuple(moved)
+            self._draw_corners()
+            if event.type == "mouseup" or not event.buttons:
+                self._taken = None
+                self._stand("ground", self._corners)
+
+    def _draw_corners(self) -> None:
+        """Yellow handles, which can be dragged, above the picture."""
+        width, height = self._size_px
+        places = [(x * width, y * height) for x, y in self._corners]
+        line = max(width, height) / 360.0
+        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+        self._image.content = AREA.format(points=points, w=line) + "".join(
+            HANDLE.format(x=x, y=y, r=4.0 * line, w=line) for x, y in places
+        )
 
     def _stand(self, field: str, value: Any) -> None:
         if value is None and field == "height_m":
@@ -170,11 +257,12 @@ class OwnFile:
         self._check(own_files.CheckFile(self._path, standpoint=self._standpoint))
 
     async def _add(self, *, walls: bool = False) -> None:
+        await self._is_checked.wait()  # The latest values count.
         session, found = self._tab.session, self._found
         folder = session.file.path.parent / own_files.ASSETS
         try:
             if found is None:
-                raise ConfigError(f"{self._path.name}: is being checked, or cannot be used")
+                raise ConfigError(f"{self._path.name}: cannot be used as it is; see its message")
             if not session.folders.contains(folder):
                 raise ConfigError(f"{folder} is outside of the folders of this page")
             found = own_files.as_walls(found) if walls else found
@@ -197,5 +285,8 @@ def describe(found: own_files.Checked) -> str:
         facts.append(f"{size} m; unit {finding.unit}; up {finding.up}")
     if finding.note:
         facts.append(finding.note)
-        facts.append("red: horizon; yellow: ground; blue: a grid of 0.1 m, or 1 m on large ground")
+        facts.append(
+            "red: horizon; yellow: ground, whose corners can be dragged; blue: a grid of 0.1 m, or "
+            "1 m on large ground"
+        )
     return "\n".join([*facts, *finding.warnings])

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from nicegui import context, ui
 from starlette.requests import Request
@@ -35,7 +36,7 @@ from gen_data.lab.edit.panels import (
 from gen_data.lab.edit.samples import Check, Shown
 from gen_data.lab.edit.session import EACH, SLOTS, Session, Variation
 from gen_data.lab.edit.start_page import StartPage
-from gen_data.lab.edit.workers import Refused, Ticket
+from gen_data.lab.edit.workers import Activity, Refused, Ticket
 
 if TYPE_CHECKING:
     from gen_data.lab.edit.desk import Desk
@@ -157,6 +158,7 @@ class EditorTab:
                 self._faults = ui.element("div").classes("gd-faults").props('role="status"')
             with ui.element("section").classes("gd-right").props('aria-label="Samples"'):
                 self._build_view_bar()
+                self._busy = ui.label("").classes("gd-busy").props('role="status"')
                 self._grid = ui.element("div").classes("gd-grid")
                 self._build_panels()
         ui.add_body_html('<script type="module" src="/edit/editor.js"></script>')
@@ -253,6 +255,7 @@ class EditorTab:
             self.editor.set_value(draft)
             ui.notify("unsaved text of this file was restored; Ctrl-Z brings back the file's")
         self._changed.set()
+        self.desk.hearers[self.key] = self._hear
         self._task = asyncio.create_task(self._follow())
 
     async def _follow(self) -> None:
@@ -267,6 +270,8 @@ class EditorTab:
                 continue
             self._order()
             self._show_faults()
+            if self.desk.schema is not None:
+                await asyncio.shield(self.desk.schema)
             with self._grid:
                 self.controls.refresh()
 
@@ -278,16 +283,24 @@ class EditorTab:
         checks = [Check(orders[0].text, orders[0].file)] if orders else []
         self.desk.order(f"{self.key}/check", checks, self._receive_check)
         self._orders = orders or self._orders
+        if orders and not self.session.results:
+            self._busy.text = "starting a process that renders ..."
+        elif not orders:
+            self._busy.text = ""
         self._show_tiles()
 
     def _receive(self, ticket: Ticket, result: Shown | Refused) -> None:
         self.session.accept(ticket, result)
+        self._busy.text = ""
         if ticket.slot < len(self._tiles):
             self._tiles[ticket.slot].show(result, self.desk, self._caption(ticket.slot))
         if isinstance(result, Refused):
             self._show_faults()
         if not self.session.outdated and len(self.session.results) == len(self._orders):
             self._refresh_panel()
+
+    def _hear(self, heard: Activity) -> None:
+        self._busy.text = f"preparing the first picture ({heard.count}): {heard.text}"
 
     def _receive_check(self, ticket: Ticket, result: tuple[Fault, ...] | Refused) -> None:
         assert isinstance(ticket.job, Check)
@@ -392,21 +405,22 @@ class EditorTab:
         self.edit(self.session.file.text)
 
     def _save_as(self) -> None:
-        with self.client.content, ui.dialog(value=True) as dialog, ui.card():
-            name = ui.input("File", value=str(self.session.file.path)).style("width: 60vw")
+        with self.client.content, ui.dialog(value=True), ui.card():
+            name = ui.input("File", value=self.session.file.path.name).style("width: 60vw")
 
             def save() -> None:
-                path = Path(name.value).expanduser()
+                old, path = self.session.name, Path(name.value).expanduser()
                 try:
                     self.session.text = self.editor.value
                     self.session.save_as(self.session.file.path.parent / path)
                 except GenDataError as error:
                     ui.notify(str(error), type="negative")
                     return
-                dialog.close()
-                self._title.text = self.session.file.path.name
-                self._state.text = self._saved_words()
+                # The address, and the key of unsaved text, have the name of the file.
+                ui.run_javascript(f"window.genDataEdit.forget({f'gen-data:{old}'!r})")
+                ui.navigate.to(f"/?open={quote(self.session.name)}")
 
+            name.on("keydown.enter", save)
             ui.button("Save", on_click=save).props("no-caps outline")
 
     def _leave(self) -> None:

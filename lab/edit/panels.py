@@ -15,11 +15,12 @@ from nicegui import ui
 
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core import processes
-from gen_data.core.errors import GenDataError
+from gen_data.core.errors import ConfigError, GenDataError
 from gen_data.lab.edit import controls, statistics
 from gen_data.lab.edit.document import list_origins
 from gen_data.lab.edit.samples import Recording
 from gen_data.lab.edit.session import drawn_values, vary
+from gen_data.lab.matching.match import LEAST, SCENES
 
 if TYPE_CHECKING:
     from gen_data.lab.edit.desk import Desk
@@ -59,8 +60,12 @@ class ControlsPanel:
     def __init__(self, tab: Tab) -> None:
         self._tab = tab
         self._item = (controls.GENERAL, "")
-        self._shown: list[controls.Control] = []
+        self._built: tuple[str, str] | None = None
+        self._controls: dict[str, controls.Control] = {}
+        self._cells: dict[str, Any] = {}
+        self._places: dict[str, Any] = {}
         self._plots: dict[str, Any] = {}
+        self._written: str | None = None  # The latest text, if a control has made it.
         self._select = (
             ui.select({}, on_change=self._picked, label="item")
             .props('dense options-dense aria-label="Item"')
@@ -97,40 +102,48 @@ class ControlsPanel:
         self._is_picking = False
         if current not in names:
             self._item = (controls.GENERAL, "")
-        found = controls.list_controls(config, *self._item)
-        if found == self._shown:
-            return
+        found = {one.field: one for one in controls.list_controls(config, *self._item)}
+        old, self._controls = self._controls, found
         # While a slider is dragged, it must not be replaced under the hand.
-        same = [(c.field, c.kind, c.form) for c in found] == [
-            (c.field, c.kind, c.form) for c in self._shown
-        ]
-        self._shown = found
-        if same and self._fields.default_slot.children:
-            return
-        self._fields.clear()
-        self._plots = {}
-        with self._fields:
-            for control in found:
-                self._build(control)
-        self.refresh_plots()
+        is_own = self._tab.session.text == self._written
+        self._written = self._written if is_own else None
+        if list(found) != list(old) or self._item != self._built:
+            self._built, self._places, self._plots = self._item, {}, {}
+            self._fields.clear()
+            with self._fields:
+                self._cells = {
+                    field: ui.element("div").classes("gd-field").props(f'data-field="{field}"')
+                    for field in found
+                }
+            old = {}
+        for field, control in found.items():
+            was = old.get(field)
+            if was is not None and is_own and (was.kind, was.form) == (control.kind, control.form):
+                self._places[field].text = control.place or "default"
+            elif control != was:
+                self._cells[field].clear()
+                with self._cells[field]:
+                    self._build(control)
+                self._plot_drawn(field)
 
     def _build(self, control: controls.Control) -> None:
-        with ui.element("div").classes("gd-field").props(f'data-field="{control.field}"'):
-            with ui.element("div").classes("gd-row"):
-                ui.label(control.field).classes("gd-name").props["title"] = control.help
-                ui.label(control.place or "default").classes("gd-place")
-                if control.kind in ("number", "range", "normal"):
-                    ui.button("vary", on_click=partial(self._vary, control)).props(
-                        f'dense flat no-caps size=sm aria-label="Vary {control.field}"'
-                    ).props["title"] = "one sample with a low, middle and high value of this field"
-            self._build_input(control)
-            if control.form and controls.find_distribution(
-                self._tab.session.config, *self._item, control.field
-            ):
-                self._plots[control.field] = ui.echart(_plot(None)).classes("gd-plot")
+        field = control.field
+        with ui.element("div").classes("gd-row"):
+            ui.label(field).classes("gd-name").props["title"] = control.help
+            self._places[field] = ui.label(control.place or "default").classes("gd-place")
+            if control.kind in ("number", "range", "normal"):
+                ui.button("vary", on_click=partial(self._vary, field)).props(
+                    f'dense flat no-caps size=sm aria-label="Vary {field}"'
+                ).props["title"] = "one sample with a low, middle and high value of this field"
+        self._build_input(control)
+        self._plots.pop(field, None)
+        if control.form and controls.find_distribution(
+            self._tab.session.config, *self._item, field
+        ):
+            self._plots[field] = ui.echart(_plot(None)).classes("gd-plot")
 
     def _build_input(self, control: controls.Control) -> None:
-        change = partial(self._change, control)
+        change = partial(self._change, control.field)
         named = f'aria-label="{control.field}"'
         if control.kind == "flag":
             ui.switch(value=bool(control.value), on_change=lambda e: change(e.value)).props(
@@ -155,91 +168,115 @@ class ControlsPanel:
                 leading_events=False,
             )
         elif control.kind == "normal":
-            now = control.value["normal"]
             for name in ("mean", "stddev"):
                 ui.number(
                     name,
-                    value=now.get(name),
+                    value=control.value["normal"].get(name),
                     step=control.step,
-                    on_change=lambda e, name=name: (
-                        e.value is not None
-                        and change(tuple(({**now, name: e.value})[k] for k in ("mean", "stddev")))
-                    ),
+                    on_change=partial(self._change_normal, control.field, name),
                 ).props("dense")
         else:
-            value = control.value["probability"] if control.form == "probability" else control.value
-            with ui.element("div").style(
-                "display: grid; grid-template-columns: 1fr 84px; gap: 10px"
-            ):
-                slider = ui.slider(
-                    min=control.low, max=control.high, step=control.step, value=value
-                ).props(f"label dense {named}")
-                ui.number(value=value, step=control.step).props(f"dense {named}").bind_value(slider)
-                slider.on(
-                    "update:model-value",
-                    lambda e: change(e.args),
-                    throttle=0.1,
-                    leading_events=False,
-                )
+            self._build_slider(control, change)
+
+    def _build_slider(self, control: controls.Control, change: Any) -> None:
+        value = control.value["probability"] if control.form == "probability" else control.value
+        with ui.element("div").style("display: grid; grid-template-columns: 1fr 84px; gap: 10px"):
+            slider = ui.slider(
+                min=control.low, max=control.high, step=control.step, value=value
+            ).props(f'label dense aria-label="{control.field}"')
+
+            def typed(event: Any) -> None:
+                if event.value is None:
+                    return
+                slider.props["min"] = min(slider.props["min"], event.value)
+                slider.props["max"] = max(slider.props["max"], event.value)
+                change(event.value)
+
+            ui.number(value=value, step=control.step, on_change=typed).props(
+                f'dense debounce=300 aria-label="{control.field}"'
+            ).bind_value(slider)
+            slider.on(
+                "update:model-value",
+                lambda e: change(e.args),
+                throttle=0.1,
+                leading_events=False,
+            )
 
     def _build_chips(self, control: controls.Control, change: Any) -> None:
-        chosen = (
-            set(controls.outcomes(control.value)) if control.kind == "weights" else {control.value}
-        )
+        is_one = control.kind == "choice"
+        chosen = {control.value} if is_one else set(controls.outcomes(control.value))
+        chips: dict[Any, Any] = {}
+
+        def toggle(option: Any, event: Any) -> None:
+            if is_one:
+                # One is selected: the others are not, and it cannot be left.
+                if event.value:
+                    change(option)
+                for other, chip in chips.items():
+                    chip.selected = other == self._controls[control.field].value
+                return
+            (chosen.add if event.value else chosen.discard)(option)
+            if chosen:
+                change([one for one in control.options if one in chosen])
+
         with ui.element("div").classes("gd-row").style("gap: 0"):
             for option in control.options:
-
-                def toggle(event: Any, option: Any = option) -> None:
-                    if control.kind == "choice":
-                        change(option)
-                        return
-                    (chosen.add if event.value else chosen.discard)(option)
-                    if chosen:
-                        change([one for one in control.options if one in chosen])
-
-                ui.chip(
+                chips[option] = ui.chip(
                     str(option),
+                    color=None,
                     selectable=True,
                     selected=option in chosen,
-                    on_selection_change=toggle,
+                    on_selection_change=partial(toggle, option),
                 ).props("dense tabindex=0")
 
-    def _change(self, control: controls.Control, value: Any) -> None:
-        session = self._tab.session
+    def _change_normal(self, field: str, name: str, event: Any) -> None:
+        if event.value is not None:
+            now = {**self._controls[field].value["normal"], name: event.value}
+            self._change(field, (now["mean"], now["stddev"]))
+
+    def _change(self, field: str, value: Any) -> None:
+        session, control = self._tab.session, self._controls[field]
         section, name = self._item
         try:
+            if session.analysis.config is None and session.text != self._written:
+                raise ConfigError("the text has faults, which controls do not show: correct it")
             plain = control.yaml(value)
             if section == controls.GENERAL:
-                text = session.set_field(control.field, "", [], plain)
+                text = session.set_field(field, "", [], plain)
             else:
-                text = session.set_field(section, name, [control.field], plain)
+                text = session.set_field(section, name, [field], plain)
         except GenDataError as error:
             ui.notify(str(error), type="negative")
             return
-        session.text = text
+        if control.value == plain or text == session.text:
+            return
+        self._controls[field] = replace(control, value=plain)
+        self._written = session.text = text
         self._tab.edit(text)
 
-    def _vary(self, control: controls.Control) -> None:
+    def _vary(self, field: str) -> None:
         """Show one sample with three values of a field."""
-        session = self._tab.session
+        session, control = self._tab.session, self._controls[field]
         section, name = self._item
         config, base = session.config, self._tab.base
-        found = controls.find_distribution(config, section, name, control.field)
+        found = controls.find_distribution(config, section, name, field)
         values = controls.three_values(control, found)
         if base is None or values is None:
             ui.notify("there is no picture to vary yet, or the field is no number")
             return
         place = "" if section == controls.GENERAL else section
-        self._tab.vary(vary(base, place, name, control.field, values))
+        self._tab.vary(vary(base, place, name, field, values))
 
     def refresh_plots(self) -> None:
         """Draw what the shown samples drew beside the declared densities."""
-        config = self._tab.session.config
-        for field, chart in self._plots.items():
-            found = controls.find_distribution(config, *self._item, field)
-            if not found:
-                continue
-            drawn = drawn_values(self._tab.session.shown, f"{self._item[1]}.{field}")
+        for field in self._plots:
+            self._plot_drawn(field)
+
+    def _plot_drawn(self, field: str) -> None:
+        session, chart = self._tab.session, self._plots.get(field)
+        found = controls.find_distribution(session.config, *self._item, field)
+        if found and chart is not None:
+            drawn = drawn_values(session.shown, f"{self._item[1]}.{field}")
             chart.options.clear()
             chart.options.update(_plot(controls.density(found, drawn)))
             chart.update()
@@ -289,8 +326,15 @@ class StatisticsPanel:
         self._real: statistics.Summary | None = None
         self._note = ui.label("")
         if tab.desk.real is not None:
-            ui.button("Fit to the real pictures", on_click=self._fit).props("dense no-caps outline")
+            with ui.element("div").classes("gd-row"):
+                ui.button("Fit to the real pictures", on_click=self._fit).props(
+                    "dense no-caps outline"
+                )
+                self._scenes = ui.number(
+                    "scenes to simulate", value=SCENES, min=LEAST, step=1, precision=0
+                ).props('dense data-fit="scenes"')
             self._progress = ui.label("").props('role="status"')
+            self._result = ui.element("div")
             ui.timer(0.0, self._read, once=True)
         self._body = ui.element("div").classes("gd-table")
 
@@ -312,11 +356,16 @@ class StatisticsPanel:
             f"brightness (mean grey value, 0 to 1): {', '.join(lights)}" if lights else ""
         )
         header = ["class"]
+        if self._real and not self._real.classes:
+            # Columns without labels would be blank.
+            self._note.text += f"; no labels found in {self._tab.desk.real}"
+            sides.pop()
         for name, side in sides:
             header += [f"{name} ({side.pictures}): boxes per picture", "median px", "occlusion"]
         self._body.clear()
         with self._body:
-            table(tuple(header), statistics.rows(ours, self._real)[:60])
+            real = self._real if len(sides) > 1 else None
+            table(tuple(header), statistics.rows(ours, real)[:60])
 
     async def _fit(self) -> None:
         """Run the command match on the saved file; its result is a file that extends it."""
@@ -335,6 +384,8 @@ class StatisticsPanel:
             str(path),
             "--out",
             str(out),
+            "--scenes",
+            str(int(self._scenes.value or SCENES)),
         )
         self._progress.text = "fitting; this takes some minutes ..."
         process = await asyncio.create_subprocess_exec(
@@ -345,7 +396,8 @@ class StatisticsPanel:
             self._progress.text = said.decode(errors="replace").strip()[-500:]
             return
         self._progress.text = f"wrote {out.name}, its report {out.with_suffix('.html').name}"
-        with self._note.parent_slot or self._body:
+        self._result.clear()
+        with self._result:
             ui.link(f"open {out.name}", f"/?open={quote(str(out))}")
 
 
@@ -406,10 +458,11 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
             state = ui.label("rendering ...")
         with ui.element("div").classes("gd-table"):
             table(
-                ("category", "size px", "occlusion"),
+                ("class", "object", "size px", "occlusion"),
                 [
                     (
                         o.category,
+                        o.name,
                         f"{o.width_px:.0f} x {o.height_px:.0f}",
                         "" if o.occlusion is None else f"{o.occlusion:.2f}",
                     )

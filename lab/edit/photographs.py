@@ -10,9 +10,12 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from gen_data.config.merging import node_name
 from gen_data.config.yaml_tree import Node
 from gen_data.core.errors import ConfigError
+from gen_data.core.plates import Plate, ground_points
 from gen_data.lab.edit import text_edits
 
 HFOV_DEG = 65.0
@@ -46,6 +49,23 @@ RENDERED = "rendered"
 """Tag of the photographs that come with gen-data, which an own one replaces."""
 
 
+Corners = tuple[tuple[float, float], ...]
+
+
+def rectangle(across: tuple[float, float], down: tuple[float, float]) -> Corners:
+    """Corners of a part of a photograph: near left, far left, far right, near right."""
+    (left, right), (top, bottom) = across, down
+    return (left, bottom), (left, top), (right, top), (right, bottom)
+
+
+GROUND = rectangle((0.1, 0.9), (0.45, 0.95))
+"""Assumed; on most photographs of tables and roads."""
+LEAST_GROUND = 0.1
+"""Least height of a ground below the horizon, as a share of the photograph's."""
+LOWEST_DEG = 3.0
+"""Least angle below the horizon of what is taken for ground: distances grow without end there."""
+
+
 @dataclass(frozen=True)
 class Standpoint:
     """What a photograph does not tell of its camera and ground.
@@ -54,15 +74,14 @@ class Standpoint:
         height_m: Height of the camera above the ground, which may be the top of a table.
         tilt_deg: How far it looks down; None = found from straight edges.
         hfov_deg: Horizontal field of view; None = of the EXIF data, else ``HFOV_DEG``.
-        across, down: Extent of the ground, shares of the photograph's width from the left and
-            height from the top.
+        ground: Corners of the ground, shares of the photograph's width from the left and height
+            from the top; None = ``GROUND``, without its part above the horizon.
     """
 
     height_m: float = 0.5
     tilt_deg: float | None = None
     hfov_deg: float | None = None
-    across: tuple[float, float] = (0.1, 0.9)
-    down: tuple[float, float] = (0.45, 0.95)
+    ground: Corners | None = None
 
     def entry(self, name: str, data: bytes, size_px: tuple[int, int]) -> dict[str, Any]:
         """Entry of the photograph under ``plates`` of an index.
@@ -84,8 +103,7 @@ class Standpoint:
         if self.tilt_deg is not None:
             row_px = 0.5 * height_px - focal_px * math.tan(math.radians(self.tilt_deg))
             entry["horizon"] = {"height_px": round(row_px, 1)}
-        (left, right), (top, bottom) = self.across, self.down
-        corners = ((left, bottom), (left, top), (right, top), (right, bottom))
+        corners = self.ground or GROUND
         entry["ground"] = [[round(x * width_px), round(y * height_px)] for x, y in corners]
         return entry
 
@@ -104,16 +122,35 @@ def _assumed_hfov_deg(share: float) -> float:
     return round(math.degrees(2.0 * half), 1)
 
 
-def upright_size_px(data: bytes, name: str) -> tuple[int, int]:
-    """Width and height of a photograph as labelling tools show it.
+def below_horizon(plate: Plate, ground: Corners) -> Corners | None:
+    """Corners of a ground, those above the horizon moved straight down; None if one cannot be."""
+    width_px, height_px = plate.size_px
+    reach_m = plate.T_world_camera.translation_m[2] / math.tan(math.radians(LOWEST_DEG))
+    lowered = []
+    for x, y in ground:
+        rows = np.linspace(y, 1.0, 201)
+        points = ground_points(plate, np.stack([np.full(201, x * width_px), rows * height_px], 1))
+        is_near = np.hypot(*points.T) <= reach_m
+        if not is_near.any():
+            return None
+        lowered.append((x, float(rows[int(np.argmax(is_near))])))
+    return tuple(lowered)
 
-    Raises:
-        AssetError: it is no image.
-    """
-    from gen_data.assets.image_decoding import decode_image
 
-    height_px, width_px = decode_image(data, name).shape[:2]
-    return width_px, height_px
+def remedy(plate: Plate, ground: Corners) -> str:
+    """What to change for a ground with a corner above the horizon."""
+    highest = min(y for _, y in ground)
+    rise = math.atan((0.5 - highest) * plate.size_px[1] / plate.focal_px)
+    tilt_deg = math.ceil(math.degrees(rise) + LOWEST_DEG)
+    text = (
+        "a corner of the ground (yellow) is above the horizon (red), or too far away: give "
+        f"'looks down' {tilt_deg} or more"
+    )
+    lowered = below_horizon(plate, ground)
+    if lowered is None:
+        return text
+    top = math.ceil(100.0 * max(new[1] for new in set(lowered) - set(ground)))
+    return f"{text}, or begin 'ground from top to bottom' at {top} or more"
 
 
 def begin_scene(folder: str, photo: str, size_px: tuple[int, int]) -> str:

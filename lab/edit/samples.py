@@ -37,7 +37,7 @@ from gen_data.report.image_statistics import measure_look
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
     from gen_data.assets.library import Library
-    from gen_data.core.interfaces import AnyAnnotator, AssetLibrary, Randomizer
+    from gen_data.core.interfaces import AnyAnnotator, AssetLibrary, Randomizer, Renderer
     from gen_data.core.sample import Sample
     from gen_data.core.scene import Scene
     from gen_data.core.streams import Rng, Streams
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 
 TEXTS_KEPT = 4
 """Latest texts whose pipelines are kept: variants of one field share most of their assets."""
+RENDERERS_KEPT = 2
+"""Renderers of the latest settings: each holds some tens of megabytes of assets."""
 SAMPLES_KEPT = 32
 """Latest small samples, on which other labels are drawn without rendering."""
 DRAWS_MAX = 300
@@ -102,12 +104,17 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Labelled:
-    """A labelled object of a picture, in pixels of the configured image."""
+    """A labelled object of a picture, in pixels of the configured image.
+
+    Attributes:
+        name: In the scene: that of its element and a number; empty = unknown.
+    """
 
     category: str
     width_px: float
     height_px: float
     occlusion: float | None
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +158,7 @@ class Studio:
     """Renders orders in one process; keeps assets, engines, pipelines and the latest samples."""
 
     def __init__(self) -> None:
-        self._libraries: CountCache[Library] = CountCache(2)
+        self._libraries: CountCache[tuple[Library, CountCache[Renderer]]] = CountCache(2)
         self._opened: CountCache[OpenedText] = CountCache(TEXTS_KEPT)
         self._taken: CountCache[Taken] = CountCache(SAMPLES_KEPT)
 
@@ -213,8 +220,10 @@ class Studio:
         )
         folders = config.asset_folders
         opened = repr([(folder, _index_time_ns(folder)) for folder in folders])
-        library = self._libraries.get(opened, lambda: open_assets(folders))
-        return OpenedText(config, library)
+        library, renderers = self._libraries.get(
+            opened, lambda: (open_assets(folders), CountCache(RENDERERS_KEPT))
+        )
+        return OpenedText(config, library, renderers)
 
 
 def _index_time_ns(folder: Path) -> int:
@@ -232,11 +241,12 @@ class OpenedText:
         sensors: First kind of picture by name of every sensor that has one.
     """
 
-    def __init__(self, config: Config, library: Library) -> None:
+    def __init__(self, config: Config, library: Library, renderers: CountCache[Renderer]) -> None:
         # Formats have no pictures: whether they can hold the data set is checked before a run.
         factory = PipelineFactory(replace(config, exporters=()), n=1)
-        # Assets stay open from text to text: opening them takes longer than a sample.
+        # Assets stay open from text to text, and in the renderer: both take longer than a sample.
         vars(factory)["library"] = library
+        vars(factory)["renderer"] = renderers.get(repr(config.render), lambda: factory.renderer)
         self._config, self.library = config, library
         self._draws: dict[str, list[Draw]] = {}
         self._pipeline: Pipeline = factory()
@@ -380,7 +390,9 @@ def _objects(taken: Taken, sensor: str) -> Iterator[Labelled]:
         if item.box is not None:
             width, height = item.box.x_max - item.box.x_min, item.box.y_max - item.box.y_min
             kind, factor = item.instance.category, taken.factor
-            yield Labelled(kind, width / factor, height / factor, item.occlusion)
+            yield Labelled(
+                kind, width / factor, height / factor, item.occlusion, item.instance.name
+            )
 
 
 def _brightness(sample: Sample, sensor: str) -> float | None:

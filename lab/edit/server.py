@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs
 
 from gen_data.core.errors import ConfigError
+from gen_data.lab.edit.completion import root_schema
 from gen_data.lab.edit.workers import Workers
 
 if TYPE_CHECKING:
@@ -158,12 +159,13 @@ def serve(desk: Desk, host: str, port: int, workers: int, announce: Callable[[st
 
     def start() -> None:
         desk.loop = asyncio.get_running_loop()
+        desk.schema = desk.loop.create_task(asyncio.to_thread(root_schema))
         # The server listens only after its start: a browser would be refused until then.
         waiting.append(desk.loop.create_task(tell()))
 
     waiting: list[asyncio.Task[None]] = []
     app.on_startup(start)
-    with Workers(workers, desk.deliver) as desk.workers:
+    with Workers(workers, desk.deliver, desk.hear) as desk.workers:
         ui.run(
             lambda: page.build(desk),
             host=host,

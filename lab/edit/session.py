@@ -13,6 +13,7 @@ from gen_data.lab.edit import text_edits
 from gen_data.lab.edit.document import Analysis, Fault, analyse, find_faults
 from gen_data.lab.edit.files import Folders, OpenedFile
 from gen_data.lab.edit.overlays import View
+from gen_data.lab.edit.photographs import is_empty
 from gen_data.lab.edit.samples import Check, Order, Shown
 from gen_data.lab.edit.workers import Refused
 
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from gen_data.assemble.config import Config
     from gen_data.lab.edit.workers import Ticket
 
+BEGIN = (
+    "nothing is here yet: type 'extends: ' and choose a name, such as tabletop.yaml, or drop a "
+    "photograph on 'Own files'"
+)
 SLOTS = (4, 6, 8, 12, 16, 24)
 EACH = ("scene", "view", "step")
 """What differs from one picture to the next."""
@@ -105,6 +110,9 @@ class Session:
         Pictures can be ordered then; the job ``Check`` finds the other faults.
         """
         self.text = text
+        if is_empty(text):
+            self.analysis = Analysis(None, (Fault(1, 1, f"{self.name}:1:1: {BEGIN}"),))
+            return
         try:
             self.folders.refuse_outside(text, self.name)
         except GenDataError as error:
@@ -179,6 +187,8 @@ class Session:
         """
         if not self.folders.contains(path):
             raise StorageError(f"{path} is outside of the folders of this page")
+        if path.exists() and not overwrite:
+            raise StorageError(f"{path}: a file of that name is there; choose another name")
         self.file = OpenedFile(path, None).save(self.text, overwrite=overwrite)
 
 

@@ -6,19 +6,22 @@ than a new process; then its process is ended. A process that crashes costs one 
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import subprocess
 import sys
 import threading
+import time
 import traceback
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
-from gen_data.core import errors, processes
+from gen_data.core import activity, errors, processes
 from gen_data.core.system_calls import KILLED
 
 if TYPE_CHECKING:
@@ -28,6 +31,8 @@ GRACE_S = 1.5
 """Time that a job has after it was replaced."""
 LIMIT_S = 120.0
 """Longest time of a job."""
+ACTIVITY_S = 0.25
+"""Least time between two activities that are told."""
 TRIES = 2
 """A job whose process crashes is tried once more: the kernel may have run out of memory."""
 MEMORY_BYTES = 3 << 30
@@ -89,6 +94,14 @@ class Reply:
     memory_bytes: int
 
 
+@dataclass(frozen=True)
+class Activity:
+    """A message of a process before its reply: what it prepares, and how many before."""
+
+    text: str
+    count: int
+
+
 @dataclass
 class Queue:
     """Waiting jobs by tab; tabs take turns."""
@@ -131,10 +144,16 @@ class Workers:
     Args:
         count: Number of processes.
         deliver: Receives each ticket that is current, and its result; called in threads.
+        hear: Receives each ticket that is current, and what its process prepares for it.
     """
 
-    def __init__(self, count: int, deliver: Callable[[Ticket, Any], None]) -> None:
-        self._deliver = deliver
+    def __init__(
+        self,
+        count: int,
+        deliver: Callable[[Ticket, Any], None],
+        hear: Callable[[Ticket, Activity], None] = lambda *_: None,
+    ) -> None:
+        self._deliver, self._hear = deliver, hear
         self._queue = Queue()
         self._changed = threading.Condition()
         self._closed = False
@@ -181,7 +200,7 @@ class Workers:
         child = self._start(number)
         while (ticket := self._wait(number, child)) is not None:
             ended = self._end_later(ticket, child, LIMIT_S)
-            reply = _ask(child, ticket.job)
+            reply = _ask(child, ticket.job, partial(self._tell, ticket))
             with self._changed:
                 self._running.pop(number, None)
                 is_current = self._queue.is_current(ticket) and not self._closed
@@ -195,6 +214,10 @@ class Workers:
                 child = self._start(number)
             if is_current:
                 self._deliver(ticket, reply.result if reply else Refused(_describe(status)))
+
+    def _tell(self, ticket: Ticket, heard: Activity) -> None:
+        if self._queue.is_current(ticket):
+            self._hear(ticket, heard)
 
     def _wait(self, number: int, child: subprocess.Popen[bytes]) -> Ticket | None:
         """The next job; None when the workers are closed."""
@@ -233,21 +256,25 @@ class Workers:
             self._children[number] = child
             if self._closed:
                 child.kill()
-        _ask(child, Ready())  # Others take the jobs while this one imports.
+        _ask(child, Ready(), lambda _: None)  # Others take the jobs while this one imports.
         return child
 
 
-def _ask(child: subprocess.Popen[bytes], job: Job) -> Reply | None:
-    """Reply of a process to a job; None if the process ends."""
+def _ask(
+    child: subprocess.Popen[bytes], job: Job, hear: Callable[[Activity], None]
+) -> Reply | None:
+    """Reply of a process to a job, after its activities; None if the process ends."""
     assert child.stdin is not None
     assert child.stdout is not None
     try:
         pickle.dump(job, child.stdin)
         child.stdin.flush()
-        reply: Reply = pickle.load(child.stdout)
+        while isinstance(reply := pickle.load(child.stdout), Activity):
+            hear(reply)
     except (OSError, EOFError, pickle.UnpicklingError):
         return None
-    return reply
+    found: Reply = reply
+    return found
 
 
 def _describe(status: int) -> str:
@@ -266,10 +293,13 @@ def work() -> None:
     with suppress(AttributeError, OSError):  # Windows has no nice.
         os.nice(NICENESS)
     processes.forbid_core_dumps()
+    # Scenes are many objects that stay: Python searches them for garbage at every 700 new ones.
+    gc.set_threshold(50_000, 20, 100)
     source, replies = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     # What native code prints must not reach the replies.
     os.dup2(2, 1)
     studio = Studio()
+    activity.listen(_Reporter(replies).tell)
     while True:
         try:
             job: Job = pickle.load(source)
@@ -277,6 +307,23 @@ def work() -> None:
             return
         pickle.dump(Reply(_run(job, studio), _memory_bytes()), replies)
         replies.flush()
+
+
+class _Reporter:
+    """Sends activities, a few in a second."""
+
+    def __init__(self, replies: Any) -> None:
+        self._replies, self._lock = replies, threading.Lock()
+        self._count, self._next_s = 0, 0.0
+
+    def tell(self, text: str) -> None:
+        """Send one, unless the last was just sent."""
+        with self._lock:
+            self._count += 1
+            if time.monotonic() >= self._next_s:
+                self._next_s = time.monotonic() + ACTIVITY_S
+                pickle.dump(Activity(text, self._count), self._replies)
+                self._replies.flush()
 
 
 def _run(job: Job, studio: Studio) -> Any:

@@ -1,6 +1,7 @@
 """Fit of a configuration to recordings: the function behind ``gen-data match``."""
 
 import json
+import re
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,7 +54,6 @@ def match(  # noqa: PLR0913  (keywords of one front door)
     """
     from threadpoolctl import threadpool_limits
 
-    from gen_data.assemble.config import load_config
     from gen_data.lab.matching.match import match_recordings
     from gen_data.lab.matching.match_report import format_match_page, make_figures
     from gen_data.lab.matching.matched_yaml import format_config
@@ -77,8 +77,10 @@ def match(  # noqa: PLR0913  (keywords of one front door)
             progress=on_progress or (lambda _: None),
         )
     figures = json.dumps(make_figures(found), ensure_ascii=False, indent=1, allow_nan=False)
+    text = format_config(found, path)
+    _refuse_invalid(text, path, source)
     files = {
-        path: format_config(found, path),
+        path: text,
         path.with_suffix(".json"): figures + "\n",
         path.with_suffix(".html"): format_match_page(found, Path(source).stem),
     }
@@ -86,6 +88,25 @@ def match(  # noqa: PLR0913  (keywords of one front door)
         write_whole({target: text.encode() for target, text in files.items()})
     except OSError as error:
         raise StorageError(f"{error.filename}: {error.strerror}; choose another --out") from error
-    # The written file must be a configuration.
-    load_config(str(path))
     return found
+
+
+def _refuse_invalid(text: str, path: Path, source: str) -> None:
+    """Refuse a configuration that could not be read back, before it is written.
+
+    Raises:
+        ConfigError: the message names the fitted configuration and its fields.
+        StorageError: there can be no folder for it.
+    """
+    from gen_data.assemble.config import parse_config
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)  # Relative paths start from it.
+        parse_config(text, str(path), path.stem)
+    except OSError as error:
+        raise StorageError(f"{error.filename}: {error.strerror}; choose another --out") from error
+    except ConfigError as error:
+        reason = re.sub(rf"^{re.escape(str(path))}:\d+:\d+: ", "", str(error), flags=re.MULTILINE)
+        raise ConfigError(
+            f"{source}: nothing is written, as its fitted fields are refused: {reason}"
+        ) from None

@@ -11,10 +11,14 @@ from gen_data.assemble.config import Config, load_config
 from gen_data.core import capture, errors, interfaces, system_calls
 from gen_data.lab.matching import label_fit, lidar_fit, real_files, recordings, results, simulation
 from gen_data.lab.matching.camera_fit import MeasuredPhoto, fit_camera, measure_photo
+from gen_data.lab.matching.quantities import base
+from gen_data.sensors.camera.image_pipeline import ImagePipeline
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 IMAGES, SCANS, SCENES = 200, 60, 48
+PRESET = ImagePipeline().preset
+"""Preset of an ``image_pipeline`` that names none."""
 LEAST = 4
 """Smallest number of recordings to read, and of scenes to compare them with."""
 S = TypeVar("S", RgbCamera, LidarSensor)
@@ -78,7 +82,11 @@ def match_recordings(  # noqa: PLR0913  (keywords of one front door)
     )
     progress("fitting the camera")
     seen = fit_camera(simulated.exposures, photos, _position(config, eye))
-    seen = replace(seen, remarks=_other_sizes(eye, photos))
+    seen = replace(
+        seen,
+        remarks=_other_sizes(eye, photos),
+        fields=(*default_preset(config, eye, seen.fields), *seen.fields),
+    )
     progress("fitting the laser scanner")
     reached = lidar_fit.fit_lidar(simulated.illuminations, swept, _position(config, scanner))
     parts = (placed, seen, reached)
@@ -109,6 +117,22 @@ def _position(config: Config, sensor: interfaces.Sensor | None) -> int:
     """Position of a sensor in the configuration; -1 for none."""
     names = [None if sensor is None else one.name for one in config.sensors]
     return -1 if sensor is None else names.index(sensor.name)
+
+
+def default_preset(
+    config: Config, camera: RgbCamera | None, fields: Sequence[results.FittedField]
+) -> Iterator[results.FittedField]:
+    """The preset of a camera whose class gives it, as ``plate_camera`` does, if others are set.
+
+    An ``image_pipeline`` that is written replaces the whole default.
+    """
+    if camera is None or not fields:
+        return
+    number, preset = _position(config, camera), camera.image_pipeline.preset
+    if "image_pipeline" not in config.resolved["sensors"][number] and preset != PRESET:
+        yield results.FittedField(
+            base.FieldChange("sensors", number, "image_pipeline.preset", preset), ()
+        )
 
 
 def _measure_photos(

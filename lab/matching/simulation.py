@@ -15,7 +15,7 @@ import numpy as np
 
 from gen_data.assemble.config import Config
 from gen_data.assemble.pipeline_factory import open_pipeline
-from gen_data.core import asset_types, se3, system_calls
+from gen_data.core import asset_types, errors, se3, system_calls
 from gen_data.core.boxes import BoxPx
 from gen_data.core.capture import Channel, LidarHits
 from gen_data.core.scene import Camera, Scene, Weather
@@ -104,16 +104,31 @@ def simulate_scenes(
         config: The configuration.
         camera: Name of the camera; empty = none.
         lidar: Name of the laser scanner; empty = none.
-        count: Number of scenes; each shows its first view.
+        count: Number of scenes; each shows its first view. Scenes without a valid layout are
+            left out.
         progress: Called before each scene.
+
+    Raises:
+        SceneRejected: more than half as many scenes as ``count`` have no valid layout.
     """
     exposures: list[Exposure] = []
     illuminations: list[Illumination] = []
     with open_pipeline(config) as pipeline:
         ids = {name: number for number, name in enumerate(pipeline.info.categories, 1)}
-        for number in range(count):
-            progress(f"scene {number + 1} of {count}")
-            accepted = pipeline.accepted_scene(number)
+        rejected = 0
+        for number in range(2 * count):
+            made = number - rejected
+            if made == count:
+                break
+            progress(f"scene {made + 1} of {count}")
+            try:
+                accepted = pipeline.accepted_scene(number)
+            except errors.SceneRejected:
+                # Some scenes have no valid layout; where half have none, the message helps more.
+                rejected += 1
+                if rejected > count // 2:
+                    raise
+                continue
             view = pipeline.drawn_view(accepted, 0)
             timeline = Timeline(view.scene, pipeline.assets, ids)
             for sensor in accepted.sensors:

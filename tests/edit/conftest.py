@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import cv2
+import numpy as np
 import pytest
 
 from tests.browser import open_browser
@@ -28,6 +30,9 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     folder = tmp_path_factory.mktemp("edit")
     (folder / "mine.yaml").write_bytes(TEXT.encode())
     write_coco(folder / "real", 1, pictures=3, names=("mug", "bowl"))
+    for picture in (folder / "real").rglob("*.png"):  # A fit leaves out pictures without colours.
+        pixels = cv2.imread(str(picture)) * (0.8, 1.0, 0.9)
+        cv2.imwrite(str(picture), pixels.astype(np.uint8))
     cache = make_cache(tmp_path_factory.mktemp("cache"))
     arguments = ("mine.yaml", "--real", "real")
     with (

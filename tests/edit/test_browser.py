@@ -120,6 +120,46 @@ def test_controls_and_layers_change_the_pictures(page: Page) -> None:
         )
 
 
+def test_sliders_follow_a_text_that_is_typed(page: Page) -> None:
+    """Key by key, also beyond their ends; then a key on one thumb keeps the value of the other."""
+    put_cursor(page, "count: 3")
+    slider = page.locator("[data-field=scale] .q-slider")
+    slider.wait_for()
+    page.keyboard.type(", scale: {uniform: [0.9, 1.2")
+    page.wait_for_selector("[data-field=scale] [aria-valuenow='0.9|1.2']")
+    slider.locator(".q-slider__thumb").first.press("ArrowRight")
+    page.wait_for_function(
+        "document.querySelector('.cm-content').textContent.includes('{uniform: [0.91, 1.2]}')"
+    )
+    put_cursor(page, "[0.91, 1.2")
+    page.keyboard.type("5")
+    page.wait_for_selector("[data-field=scale] [aria-valuenow='0.91|1.25']")
+    put_cursor(page, "[0.91, 1")
+    page.keyboard.type("7")
+    page.wait_for_selector("[data-field=scale] [aria-valuenow='0.91|17.25']")
+    assert float(slider.get_attribute("aria-valuemax") or 0) >= 17.25
+    # A number that is typed next to a slider goes into the text, too.
+    count = page.locator("[data-field=count] input")
+    count.fill("21")
+    page.wait_for_function(
+        "document.querySelector('.cm-content').textContent.includes('count: 21,')"
+    )
+    assert float(page.locator("[data-field=count] .q-slider").get_attribute("aria-valuemax")) >= 21
+
+
+def test_controls_do_not_overwrite_a_text_with_faults(page: Page) -> None:
+    """They show the latest valid text: the message asks to correct the other."""
+    put_cursor(page, "count: 3")
+    slider = page.locator("[data-field=scale] .q-slider")
+    slider.wait_for()
+    page.keyboard.type(", cuont: 1")
+    page.wait_for_selector(".gd-fault:has-text('cuont')")
+    text = text_of(page)
+    slider.locator("[tabindex]").press("ArrowRight")
+    page.wait_for_selector(".q-notification:has-text('the text has faults')")
+    assert text_of(page) == text
+
+
 def test_each_view_has_the_pictures_that_the_library_draws(live: Live, page: Page) -> None:
     """Depth, normals, and keypoints and 3D boxes on the photograph, in the order of the tiles."""
     studio, start = Studio(), View()
@@ -147,6 +187,50 @@ def test_each_view_has_the_pictures_that_the_library_draws(live: Live, page: Pag
     for layer in ("keypoints", "boxes3d"):
         layers ^= {layer}
         expect(replace(start, layers=layers), partial(page.click, f"[data-layer={layer}]"))
+
+
+def test_a_scanner_has_its_view_from_above(live: Live, page: Page) -> None:
+    """The pictures that the library draws of the same sweeps."""
+    text = LINES.replace(", sensors: [pseudo_lidar]", "")
+    before = page.evaluate(COUNTS)
+    set_text(page, text)
+    wait_for_pictures(page, before)
+    before = page.evaluate(COUNTS)
+    page.click("label:has-text('picture') >> nth=0")
+    page.click(".q-item:has-text('LiDAR from above')")
+    wait_for_pictures(page, before)
+    page.wait_for_function(DRAWN)
+    studio, order = Studio(), Order(text, str(live.folder / "mine.yaml"), 0, View("scan"))
+    shown = [studio.show(replace(order, index=k)) for k in range(4)]
+    assert {one.sensors["pseudo_lidar"] for one in shown} == {"scan"}
+    assert pictures(page) == [one.jpeg for one in shown]
+    page.click("label:has-text('picture') >> nth=0")
+    page.click(".q-item:has-text('photograph')")
+
+
+def test_a_text_is_saved_under_another_name(live: Live, page: Page) -> None:
+    """Which the page then has; the first file stays, and names that are taken are refused."""
+    with live.tab("?open=mine.yaml") as other:
+        other.wait_for_selector(".gd-tile")
+        saved = live.read()
+        expected = text_of(other).replace("# My table", "# My table, again")
+        type_behind(other, "# My table", ", again")
+        for name, told in (("mine.yaml", "is there"), ("../x.yaml", "outside of the folders")):
+            other.click("button:has-text('Save as')")
+            other.fill("input[aria-label=File]", name)
+            other.press("input[aria-label=File]", "Enter")
+            other.wait_for_selector(f".q-notification:has-text('{told}')")
+            other.keyboard.press("Escape")
+            other.wait_for_selector(".q-dialog", state="detached")
+        other.click("button:has-text('Save as')")
+        other.fill("input[aria-label=File]", "copy.yaml")
+        other.click(".q-dialog button:has-text('Save')")
+        other.wait_for_selector(".gd-title:text-is('copy.yaml')")
+        assert other.url.endswith("?open=copy.yaml")
+        assert text_of(other) == expected
+        assert (live.folder / "copy.yaml").read_text() == expected
+        assert live.read() == saved
+    (live.folder / "copy.yaml").unlink()
 
 
 def test_a_sample_in_full_size_has_its_draws_and_a_recording(page: Page) -> None:

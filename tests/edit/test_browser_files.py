@@ -18,7 +18,7 @@ from tests.edit.live_page import COUNTS, LOADED, Live, set_text, text_of, wait_f
 from tests.report.handmade import HOSTILE_NAME, make_image, make_object, write_dataset
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Locator, Page
 
 pytestmark = pytest.mark.slow
 
@@ -43,6 +43,12 @@ DROP = """async ([name, text]) => {
 }"""
 
 
+IN_VIEW = """name => {
+  const card = document.querySelector(`[data-file='${name}']`).getBoundingClientRect();
+  return card.top >= 0 && card.top < innerHeight - 100;
+}"""
+
+
 def photograph() -> bytes:
     """A plain table seen from above its edge: no straight edge shows its horizon."""
     image = np.full((240, 320, 3), (150, 170, 190), np.uint8)
@@ -54,7 +60,9 @@ def photograph() -> bytes:
 def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
     """In an empty file: the photograph stands behind four classes; a dropped mesh is the fifth."""
     with live.tab("?open=mine_too.yaml") as page:
-        page.wait_for_selector(".gd-fault")
+        page.wait_for_selector(".gd-fault:has-text(\"type 'extends: '\")")
+        page.click("[data-grid=slots]")
+        page.click(".q-item:has-text('4')")
         page.click(".q-tab:has-text('Own files')")
         file = {"name": "desk.jpg", "mimeType": "image/jpeg", "buffer": photograph()}
         page.set_input_files("input[type=file]", [file])
@@ -62,14 +70,34 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
         card.locator("[role=status]:has-text('no horizon was found')").wait_for()
         tilt = card.locator("[data-standpoint=tilt_deg]")
         assert tilt.input_value() == "30"
-        drawn = card.locator("img").get_attribute("src")
-        tilt.fill("40")
-        page.wait_for_function(
-            "old => document.querySelector('[data-file] img').getAttribute('src') !== old",
-            arg=drawn,
+        card.locator("[data-standpoint=height_m]").fill("1")
+        card.locator("[role=status]:has-text('room for things 1.2 m')").wait_for()
+        picture = card.locator("img")
+
+        def await_another(drawn: str | None) -> None:
+            page.wait_for_function(
+                "old => document.querySelector('[data-file] img').getAttribute('src') !== old",
+                arg=drawn,
+            )
+
+        for given, told in (
+            (
+                "2",
+                "give 'looks down' 9 or more, or begin 'ground from top to bottom' at 53",
+            ),
+            ("40", "a grid of 0.1 m"),
+        ):
+            drawn = picture.get_attribute("src")
+            drag(page, card, (0.1, 0.45), (0.1, 0.4)) if given == "2" else None
+            tilt.fill(given)
+            card.locator(f'[role=status]:has-text("{told}")').wait_for()
+            await_another(drawn)
+        drag(page, card, (0.1, 0.4), (0.25, 0.5))
+        page.wait_for_selector(
+            "[aria-label='ground from top to bottom [%]'][aria-valuenow='45|95']"
         )
         card.locator("button:has-text('Add to the scene')").click()
-        page.wait_for_function(f"{COUNTS}.length === 8 && {COUNTS}.every(n => n)")
+        page.wait_for_function(f"{COUNTS}.length === 4 && {COUNTS}.every(n => n)")
         assert "{type: plate, name: plate, photos: [user/desk]}" in text_of(page)
         page.evaluate(DROP, ["my wedge.obj", TETRAHEDRON])
         card = page.locator("[data-file='my wedge.obj']")
@@ -77,11 +105,46 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
         before = page.evaluate(COUNTS)
         card.locator("button:has-text('Add to the scene')").click()
         wait_for_pictures(page, before)
+        assert page.evaluate(IN_VIEW, "my wedge.obj")
         page.click(".q-tab:has-text('Statistics')")
         page.wait_for_selector(".gd-table td:has-text('my wedge')")
         assert {p.name for p in (live.folder / "assets").iterdir()} == {
             "assets.yaml", "desk.jpg", "my wedge.obj"
         }  # fmt: skip
+        kept = (live.folder / "assets/assets.yaml").read_text()
+        assert "[32, 228], [80, 120], [288, 108], [288, 228]" in kept
+        page.click(".gd-tile >> nth=0")
+        page.wait_for_selector(".q-dialog td >> text=/^(things|own_my_wedge)/")
+        page.click(".q-dialog button:has-text('Close')")
+        page.get_by_role("button", name="Save", exact=True).click()
+        page.wait_for_selector("[role=status]:text-is('saved')")
+        fit(page)
+        page.click("a:has-text('open mine_too_matched.yaml')")
+        page.wait_for_selector(".gd-title:text-is('mine_too_matched.yaml')")
+        page.wait_for_function(f"{COUNTS}.some(n => n)")
+        assert page.locator(".gd-fault").count() == 0
+        assert "\n      preset: photograph\n" in text_of(page)
+
+
+def fit(page: Page) -> None:
+    """With few scenes, until it tells which file it has written."""
+    page.click(".q-tab:has-text('Statistics')")
+    page.fill("[data-fit=scenes]", "4")
+    page.click("button:has-text('Fit to the real pictures')")
+    page.wait_for_selector("[role=status]:has-text('wrote mine_too_matched.yaml')")
+
+
+def drag(page: Page, card: Locator, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """Drag a place of a card's picture to another one, by their shares of its edges."""
+    picture = card.locator("img")
+    picture.scroll_into_view_if_needed()
+    box = picture.bounding_box()
+    assert box is not None
+    place = [(box["x"] + x * box["width"], box["y"] + y * box["height"]) for x, y in (start, end)]
+    page.mouse.move(*place[0])
+    page.mouse.down()
+    page.mouse.move(*place[1], steps=3)
+    page.mouse.up()
 
 
 def test_a_scene_of_meshes_has_no_place_for_a_photograph_behind_it(live: Live, page: Page) -> None:

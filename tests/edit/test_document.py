@@ -25,6 +25,16 @@ def labels(marked: str) -> list[str]:
     return [one.label for one in found]
 
 
+def test_a_file_that_is_not_saved_yet_names_files_next_to_it(tmp_path: Path) -> None:
+    """As it will when it is saved, wherever the command was started."""
+    (tmp_path / "base.yaml").write_text("extends: closeup.yaml\nseed: 77\n")
+    (tmp_path / "assets").mkdir()
+    text = "extends: base.yaml\nassets: {folders: [assets]}\n"
+    config = analyse(text, str(tmp_path / "new.yaml")).config
+    assert config is not None
+    assert (config.general.seed, config.asset_folders) == (77, (tmp_path / "assets",))
+
+
 @pytest.mark.parametrize(
     "wrong",
     ["seed: -7\n", "seed: 7\nrandomizers:\n  - {type: objects, name: a, cuont: 3}\n", "a: [\n"],

@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
 import pytest
 
 from gen_data.assemble.config import parse_config
 from gen_data.core.errors import ConfigError
-from gen_data.lab.edit.photographs import UNKNOWN, Standpoint, is_empty, show_behind
+from gen_data.lab.edit.own_files import Checked, CheckFile, Misplaced
+from gen_data.lab.edit.photographs import (
+    GROUND,
+    LOWEST_DEG,
+    UNKNOWN,
+    Standpoint,
+    is_empty,
+    rectangle,
+    show_behind,
+)
+from gen_data.lab.edit.samples import Studio
 
 
 def test_an_entry_has_the_horizon_of_the_tilt() -> None:
     """Fields of 90 degrees have a focal length of half the width: 45 degrees are 400 px up."""
-    standpoint = Standpoint(0.6, 45.0, 90.0, (0.25, 0.75), (0.5, 1.0))
+    standpoint = Standpoint(0.6, 45.0, 90.0, rectangle((0.25, 0.75), (0.5, 1.0)))
     assert standpoint.entry("a.jpg", b"", (800, 600)) == {
         "file": "a.jpg",
         "camera_height_m": 0.6,
@@ -21,6 +38,65 @@ def test_an_entry_has_the_horizon_of_the_tilt() -> None:
     }
     assert "horizon" not in Standpoint(hfov_deg=90.0).entry("a.jpg", b"", (800, 600))
     assert UNKNOWN.tilted().tilt_deg == 30.0
+
+
+def below_deg(x: float, y: float, tilt_deg: float) -> float:
+    """Angle below the horizon of a place in a photograph of 320 x 240 px and 90 degrees across."""
+    right, down, tilt = 2.0 * x - 1.0, 0.75 * (2.0 * y - 1.0), math.radians(tilt_deg)
+    drop = math.sin(tilt) + down * math.cos(tilt)
+    return math.degrees(math.atan2(drop, math.hypot(right, math.cos(tilt) - down * math.sin(tilt))))
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Path:
+    """A photograph without edges."""
+    path = tmp_path / "desk.png"
+    cv2.imwrite(str(path), np.full((240, 320, 3), 130, np.uint8))
+    return path
+
+
+def check(desk: Path, **given: Any) -> Checked | Misplaced:
+    return CheckFile(desk, standpoint=Standpoint(hfov_deg=90.0, **given)).run(Studio())
+
+
+def test_a_ground_that_was_not_given_ends_below_the_horizon(desk: Path) -> None:
+    """Of a camera that looks a little upwards; one that looks down keeps the whole of it."""
+    found = check(desk, tilt_deg=-3.0)
+    assert isinstance(found, Checked)
+    assert found.standpoint.ground is not None
+    near_left, far_left, *_ = found.standpoint.ground
+    assert near_left == GROUND[0]
+    assert LOWEST_DEG <= below_deg(*far_left, -3.0) < LOWEST_DEG + 0.5
+    found = check(desk, tilt_deg=30.0)
+    assert isinstance(found, Checked)
+    assert found.standpoint.ground == GROUND
+
+
+def test_a_ground_above_the_horizon_is_shown_with_the_values_that_mend_it(desk: Path) -> None:
+    """Both values of the message work: the angle with this ground, and the ground's new end."""
+    ground = rectangle((0.1, 0.9), (0.3, 0.9))
+    found = check(desk, tilt_deg=5.0, ground=ground)
+    assert isinstance(found, Misplaced)
+    assert cv2.imdecode(np.frombuffer(found.jpeg, np.uint8), 1).shape == (540, 720, 3)
+    numbers = re.search(
+        r"give 'looks down' (\d+) or more, or begin 'ground from top to bottom' at (\d+) or more",
+        found.text,
+    )
+    assert numbers is not None
+    tilt_deg, top = map(int, numbers.groups())
+    # The middle of the upper edge is the highest place: -atan(0.75 * (2 * 0.3 - 1)) = 16.7 degrees.
+    assert tilt_deg == 20
+    assert isinstance(check(desk, tilt_deg=float(tilt_deg), ground=ground), Checked)
+    ground = rectangle((0.1, 0.9), (0.01 * top, 0.9))
+    assert isinstance(check(desk, tilt_deg=5.0, ground=ground), Checked)
+
+
+def test_a_photograph_without_ground_has_the_angle_that_gives_it_some(desk: Path) -> None:
+    """Of a camera that looks steeply upwards."""
+    found = check(desk, tilt_deg=-60.0)
+    assert isinstance(found, Misplaced)
+    assert "give 'looks down' 8 or more" in found.text
+    assert isinstance(check(desk, tilt_deg=8.0), Checked)
 
 
 def test_an_own_photograph_replaces_those_that_come_with_gen_data() -> None:

@@ -32,6 +32,28 @@ def import_plate(folder: Folder, entry: PlateEntry) -> plates.Plate:
     place = str(folder.root / entry.file)
     data = folder.read(entry.file)
     rgb = decode_image(data, place)
+    plate = locate_camera(entry, data, rgb, place)
+    _check_ground(plate, place)
+    hidden = _read_mask(folder, entry, plate)
+    lanes = tuple(_lane(plate, lane, k, place) for k, lane in enumerate(entry.lanes))
+    color = _ground_color(plate, rgb, hidden, place)
+    return surroundings(replace(plate, lanes=lanes, ground_color=color), rgb)[0]
+
+
+def locate_camera(
+    entry: PlateEntry, data: bytes, rgb: asset_types.UInt8, place: str
+) -> plates.Plate:
+    """Plate of a photograph with its camera only; its ground may be above the horizon.
+
+    Args:
+        entry: Of the photograph.
+        data: Content of its file, for its EXIF data.
+        rgb: Its pixels, uint8 [h, w, 3].
+        place: Name of the file in messages.
+
+    Raises:
+        AssetError: no horizon is found, or the field of view is unknown.
+    """
     height_px, width_px = rgb.shape[:2]
     if entry.hfov_deg is None:
         focal_px = exif_focal_px(data, width_px, height_px)
@@ -43,7 +65,7 @@ def import_plate(folder: Folder, entry: PlateEntry) -> plates.Plate:
     except ValueError as error:
         fact = "hfov_deg" if focal_px is None and entry.horizon is not None else "horizon"
         raise errors.AssetError(f"{place}: {fact}: {error}") from None
-    plate = plates.Plate(
+    return plates.Plate(
         size_px=(width_px, height_px),
         focal_px=round(focal_px, 6),
         T_world_camera=pose,
@@ -55,11 +77,6 @@ def import_plate(folder: Folder, entry: PlateEntry) -> plates.Plate:
         estimated=estimate is not None,
         horizon_error_rad=round(estimate.error_rad, 6) if estimate else 0.0,
     )
-    _check_ground(plate, place)
-    hidden = _read_mask(folder, entry, plate)
-    lanes = tuple(_lane(plate, lane, k, place) for k, lane in enumerate(entry.lanes))
-    color = _ground_color(plate, rgb, hidden, place)
-    return surroundings(replace(plate, lanes=lanes, ground_color=color), rgb)[0]
 
 
 def exif_focal_px(data: bytes, width_px: int, height_px: int) -> float | None:

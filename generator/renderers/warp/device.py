@@ -20,7 +20,7 @@ from typing import Any
 
 import warp as wp
 
-from gen_data.core import errors, processes, system_calls
+from gen_data.core import activity, errors, processes, system_calls
 from gen_data.renderers.warp import kernel_cache
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
@@ -172,6 +172,8 @@ def _fill(folder: Path, stamp_name: str, device: str) -> None:
         if bundle.is_dir():
             kernel_cache.copy_modules(bundle, folder)
         bundled = device == "cpu" and bundle.is_dir()
+        if not bundled:
+            activity.tell("compiling the renderer, once on this machine")
         if not bundled and (cores < 2 or not compile_in_parallel(device, EVERY_FRAME, folder)):
             return
         stamp.touch()
