@@ -223,3 +223,12 @@ READERS: tuple[Reader, ...] = (
     Reader("tfrecord", "rlds", S.by_tfrecord_geometry, step_geometry, "arm", "m, ids, 0.1 mm",
            FLOATS, lens=FLOATS, because="32-bit floats"),
 )  # fmt: skip
+
+WITHOUT_READER = {
+    "argoverse2": "av2 requires torch and kornia; docs/maps.md has the command",
+    "culane": "its evaluation is a program in C++, in no registry",
+    "map_vectors": "MapTR is in no registry",
+    "opendrive": "our reader; ASAM's checker requires packages of its own (docs/maps.md)",
+    "openlane": "its evaluation is in no registry",
+}
+"""Formats without a row, with the reason; tests/exporters compares them with their formulas."""
