@@ -38,7 +38,7 @@ from gen_data.core.scene import Lane, Scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.exporters import base, fragments
 from gen_data.exporters.conventions import SAMPLE, Conventions
-from gen_data.exporters.road_map import Geometry, RoadMap, lane_area, road_map
+from gen_data.exporters.road_map import Geometry, RoadMap, check_street, lane_area, road_map
 from gen_data.exporters.sequences import write_json, write_text
 
 CLASSES = ("divider", "ped_crossing", "boundary")
@@ -78,10 +78,7 @@ class MapVectors(base.AssetExporter):
         Raises:
             ConfigError: the text names the missing element.
         """
-        if not any(lane.kind == "driving" for lane in scene.lanes):
-            raise ConfigError(
-                f"exporter '{self.type}': the scene has no driving lane; add an element 'road'"
-            )
+        check_street(scene, self.type)
         self._ego(scene)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

@@ -22,13 +22,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.exporters import base, fragments, image_files
 from gen_data.exporters.conventions import NO_CONVENTIONS, Conventions
 from gen_data.exporters.opendrive_xml import opendrive_bytes
+from gen_data.exporters.road_map import check_street
 from gen_data.exporters.sequences import write_bytes, write_text
 
 WORLDS = "worlds"
@@ -56,10 +56,7 @@ class OpenDrive(base.AssetExporter):
         Raises:
             ConfigError: the text names the missing element.
         """
-        if not any(lane.kind == "driving" for lane in scene.lanes):
-            raise ConfigError(
-                f"exporter '{self.type}': the scene has no driving lane; add an element 'road'"
-            )
+        check_street(scene, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the file of each world of the shard, and a line per sample.

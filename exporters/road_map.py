@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gen_data.assets.asset_ids import parse_asset_id
 from gen_data.assets.drape import split_draped
+from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.lane_geometry import LaneBorder, border_line, lane_borders
 from gen_data.core.scene import Body, Lane, Scene
@@ -48,6 +49,14 @@ LAMPS: Mapping[str, Literal["RED", "YELLOW", "GREEN"]] = {
 
 Geometry = Any
 """Of Shapely, which has no types."""
+
+
+def check_street(scene: Scene, exporter: str) -> None:
+    """Raise ConfigError if a scene has no driving lane."""
+    if not any(lane.kind == "driving" for lane in scene.lanes):
+        raise ConfigError(
+            f"exporter '{exporter}': the scene has no driving lane; add an element 'road'"
+        )
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -24,7 +24,7 @@ from gen_data.lab.matching.picture import Picture
 from gen_data.lab.matching.quantities import CameraQuantity, LidarQuantity
 from gen_data.lab.matching.recordings import Box, ImageLabels, Scan
 from gen_data.pipeline.finalize_scene import Timeline
-from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop, take_shot
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
@@ -42,7 +42,7 @@ class Exposure:
 
     Attributes:
         radiance: Linear RGB [cd/m^2], float32 [h, w, 3].
-        depth_m: As ``develop`` takes it; None if no stage needs it.
+        depth_m: As ``take_shot`` takes it; None if no stage needs it.
         pipeline: Settings of the scene's camera.
     """
 
@@ -173,7 +173,9 @@ def photograph(exposure: Exposure, pipeline: ImagePipeline) -> Picture:
     """Develop a photograph with a pipeline."""
     rng = exposure.streams.rng("match")
     photo = develop(
-        exposure.radiance, exposure.depth_m, exposure.camera, exposure.weather, pipeline, rng
+        take_shot(
+            exposure.radiance, exposure.depth_m, exposure.camera, exposure.weather, pipeline, rng
+        )
     )
     return Picture(photo.rgb)
 

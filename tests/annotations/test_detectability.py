@@ -17,7 +17,7 @@ from gen_data.core.scene import Camera, Instance, Scene, Weather
 from gen_data.core.se3 import SE3
 from gen_data.core.streams import Streams
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
-from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop_shot, set_up_shot
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop, take_shot
 from gen_data.sensors.camera.image_sensor import FILTERS, ImageSensor, expected_exposure, expose
 
 W, H = 48, 40
@@ -150,8 +150,8 @@ def developed(with_signal: bool, **given: Any) -> Any:
     radiance = with_ball((20.0, 20.0, 20.0), (23.0, 22.0, 20.0))
     rng = Streams(seed=1, scene=0).rng("noise")
     pipeline = ImagePipeline.model_validate(given)
-    shot = set_up_shot(radiance, None, CAMERA, Weather(), pipeline, rng)
-    return develop_shot(*shot, with_signal=with_signal)
+    shot = take_shot(radiance, None, CAMERA, Weather(), pipeline, rng)
+    return develop(shot, with_signal=with_signal)
 
 
 def test_asking_for_it_changes_no_byte_of_the_photograph() -> None:

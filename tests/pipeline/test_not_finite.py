@@ -23,7 +23,7 @@ from gen_data.core.streams import Rng, Streams
 from gen_data.pipeline.checked_renderer import CheckedRenderer
 from gen_data.pipeline.pipeline import Pipeline
 from gen_data.runner.regeneration import write_alone
-from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop, take_shot
 from gen_data.sensors.camera.image_sensor import ImageSensor
 
 SMALL = ("sensors.color.size_px=[32, 24]", "sensors.color.ev100=9")
@@ -174,7 +174,7 @@ def test_a_setting_of_a_camera_that_is_nan_makes_no_photograph(field: str) -> No
     radiance = np.full((12, 16, 3), 100.0, np.float32)
 
     with pytest.raises(SampleError, match=rf"image_pipeline\.{field}: drew nan"):
-        develop(radiance, None, camera, Weather(), pipeline, rng)
+        develop(take_shot(radiance, None, camera, Weather(), pipeline, rng))
 
 
 def test_noise_of_a_sensor_that_is_nan_makes_no_photograph() -> None:
@@ -186,7 +186,7 @@ def test_noise_of_a_sensor_that_is_nan_makes_no_photograph() -> None:
     radiance = np.full((12, 16, 3), 100.0, np.float32)
 
     with pytest.raises(SampleError, match=r"color\.image_pipeline: a stage makes NaN"):
-        develop(radiance, None, camera, Weather(), pipeline, rng)
+        develop(take_shot(radiance, None, camera, Weather(), pipeline, rng))
 
 
 @pytest.mark.parametrize("name", ["vertices_m", "normals", "uvs"])

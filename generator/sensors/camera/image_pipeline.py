@@ -198,7 +198,8 @@ class Shot:
         weather: Source of drops on the lens.
         depth_m: [h, w], along the optical axis for pinholes, else along the ray; inf = nothing.
             None if no stage needs it.
-        exposure: As set or metered.
+        ev100: Exposure value that was set or metered, without compensation and errors.
+        exposure: Of the shot, with both.
         rng: Draws parameters, which are the same at all steps of a sequence.
         noise_rng: Draws the noise of the sensor.
     """
@@ -208,6 +209,7 @@ class Shot:
     radiance: Float32
     weather: Weather
     depth_m: NDArray[np.floating] | None
+    ev100: float
     exposure: ExposureSettings
     rng: streams.Rng
     noise_rng: streams.Rng
@@ -252,7 +254,7 @@ def capture_photograph(
 ) -> capture.SensorReading:
     """Render the channels of a camera and, if RGB is among them, develop its photograph.
 
-    ``rng`` and ``settings_rng`` are those of ``develop``.
+    ``rng`` and ``settings_rng`` are as for ``take_shot``.
     """
     developed = frozenset({capture.Channel.RGB, capture.Channel.SIGNAL})
     if capture.Channel.RGB not in channels:
@@ -266,8 +268,8 @@ def capture_photograph(
     reading = renderer.render(scene, camera, needed, *tones)
     radiance = reading.channels[capture.Channel.RADIANCE]
     depth_m = reading.channels.get(depth)
-    shot = set_up_shot(radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng)
-    photo = develop_shot(*shot, with_signal=capture.Channel.SIGNAL in channels)
+    shot = take_shot(radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng)
+    photo = develop(shot, with_signal=capture.Channel.SIGNAL in channels)
     images = {k: image for k, image in reading.channels.items() if k in channels}
     images[capture.Channel.RGB] = photo.rgb
     return replace(reading, channels=images, ev100=photo.ev100, signal=photo.signal)
@@ -283,7 +285,7 @@ def _tones_of(camera: Camera, pipeline: ImagePipeline) -> interfaces.FindTones:
     return find
 
 
-def develop(
+def take_shot(
     radiance: Float32,
     depth_m: NDArray[np.floating] | None,
     camera: Camera,
@@ -291,29 +293,12 @@ def develop(
     pipeline: ImagePipeline,
     rng: streams.Rng,
     settings_rng: streams.Rng | None = None,
-) -> Photograph:
-    """Develop a photograph: meter the exposure, then apply all of ``STAGES`` in order.
+) -> Shot:
+    """Set or meter the exposure of a photograph.
 
     Arguments are as in ``Shot``; the depth is needed only by a pipeline with a focus. ``rng`` draws
     the noise, and the settings too unless another camera's stream is given for them.
-
-    Raises:
-        SampleError: a stage makes NaN or infinite values.
     """
-    shot, ev100 = set_up_shot(radiance, depth_m, camera, weather, pipeline, rng, settings_rng)
-    return develop_shot(shot, ev100)
-
-
-def set_up_shot(
-    radiance: Float32,
-    depth_m: NDArray[np.floating] | None,
-    camera: Camera,
-    weather: Weather,
-    pipeline: ImagePipeline,
-    rng: streams.Rng,
-    settings_rng: streams.Rng | None = None,
-) -> tuple[Shot, float]:
-    """The exposure of a photograph, set or metered, and its exposure value; see ``develop``."""
     noise_rng, rng = rng, (settings_rng or rng).of_sequence()
     ev100 = _set_or_metered(radiance, camera, pipeline)
     wanted = ev100 - _draw(pipeline, "exposure_compensation_ev", rng)
@@ -321,10 +306,10 @@ def set_up_shot(
     exposure = ExposureSettings(0.0, 1.0, wanted)
     if pipeline.image_sensor is not None:
         exposure = exposure_settings(wanted, pipeline.exposure_control)
-    return Shot(pipeline, camera, radiance, weather, depth_m, exposure, rng, noise_rng), ev100
+    return Shot(pipeline, camera, radiance, weather, depth_m, ev100, exposure, rng, noise_rng)
 
 
-def develop_shot(shot: Shot, ev100: float, *, with_signal: bool = False) -> Photograph:
+def develop(shot: Shot, *, with_signal: bool = False) -> Photograph:
     """Apply all of ``STAGES`` and the tone; ``with_signal`` adds the signal, and changes no byte.
 
     Raises:
@@ -347,7 +332,7 @@ def develop_shot(shot: Shot, ev100: float, *, with_signal: bool = False) -> Phot
         # Rounding to bytes is all the noise of an ideal camera.
         quantised = np.full(rgb.shape, 1.0 / (255.0 * math.sqrt(12.0)), np.float32)
         signal = capture.ExpectedSignal(rgb.astype(np.float32) / np.float32(255.0), quantised)
-    return Photograph(rgb, ev100, signal)
+    return Photograph(rgb, shot.ev100, signal)
 
 
 def _set_or_metered(radiance: Float32, camera: Camera, pipeline: ImagePipeline) -> float:

@@ -73,7 +73,9 @@ def picture(ev100: float, strength: float) -> NDArray[np.uint8]:
     })  # fmt: skip
     wall = np.full((48, 64, 3), 0.18 * 1.2 * 2.0**ev100, np.float32)
     rng = streams.Streams(seed=5, scene=0).rng("test")
-    return image_pipeline.develop(wall, None, eye, scene.Weather(), pipeline, rng).rgb
+    return image_pipeline.develop(
+        image_pipeline.take_shot(wall, None, eye, scene.Weather(), pipeline, rng)
+    ).rgb
 
 
 def test_the_stage_changes_dim_pictures_alone() -> None:

@@ -22,6 +22,7 @@ from gen_data.sensors.camera.image_pipeline import (
     ImagePipeline,
     capture_photograph,
     develop,
+    take_shot,
 )
 from gen_data.sensors.camera.isp import display_values, to_bytes
 from gen_data.sensors.camera.rgb_camera import RgbCamera
@@ -69,7 +70,9 @@ def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
     def picture(given: dict[str, Any], weather: Weather) -> Any:
         pipeline = ImagePipeline.model_validate_json(json.dumps(given))
         depth_m = np.full((48, 64), 2.0)
-        return develop(np.float32(radiance), depth_m, CAMERA, weather, pipeline, rng()).rgb
+        return develop(
+            take_shot(np.float32(radiance), depth_m, CAMERA, weather, pipeline, rng())
+        ).rgb
 
     wet = Weather(lens_drops=0.3, seed=3)
     whole = picture(everything, wet)
@@ -85,7 +88,7 @@ def test_ideal_is_the_default_and_reaches_every_exposure() -> None:
     assert "ideal" in preset_names(PRESETS)
     assert ImagePipeline() == ImagePipeline(preset="ideal")
 
-    photo = develop(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng())
+    photo = develop(take_shot(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng()))
 
     expected = to_bytes(display_values(speckled().astype(np.float64) / WHITE_CD_M2, "filmic"))
     assert np.abs(photo.rgb.astype(int) - expected).max() <= 1
@@ -94,7 +97,9 @@ def test_ideal_is_the_default_and_reaches_every_exposure() -> None:
     night = np.full((48, 64, 3), 0.25 * 1.2 * 2.0**-9, np.float32)
     camera = Camera("eye", SE3(), LENS, ev100=-9.0)
 
-    ideal = develop(night, None, camera, Weather(), ImagePipeline(tone="srgb"), rng()).rgb
+    ideal = develop(
+        take_shot(night, None, camera, Weather(), ImagePipeline(tone="srgb"), rng())
+    ).rgb
 
     # IEC 61966-2-1: a quarter of white is byte 137.
     assert (ideal == 137).all()
@@ -104,8 +109,8 @@ def test_exposure_compensation_is_in_stops() -> None:
     """+1 stop shows half the luminance in the same tone."""
     pushed = ImagePipeline.model_validate_json('{"exposure_compensation_ev": 1.0}')
 
-    plain = develop(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng()).rgb
-    brighter = develop(0.5 * speckled(), None, CAMERA, Weather(), pushed, rng()).rgb
+    plain = develop(take_shot(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng())).rgb
+    brighter = develop(take_shot(0.5 * speckled(), None, CAMERA, Weather(), pushed, rng())).rgb
 
     np.testing.assert_array_equal(plain, brighter)
 
@@ -118,7 +123,7 @@ def test_glare_ends_where_the_lens_shows_nothing() -> None:
     radiance = np.where(dark[..., None], 0.0, speckled(96, 96)).astype(np.float32)
     veiled = ImagePipeline.model_validate_json('{"glare": 0.1}')
 
-    rgb = develop(radiance, None, camera, Weather(), veiled, rng()).rgb
+    rgb = develop(take_shot(radiance, None, camera, Weather(), veiled, rng())).rgb
 
     assert 0.2 < dark.mean() < 0.9
     assert not rgb[dark].any()
@@ -147,7 +152,7 @@ def test_radiance_is_left_as_it_was() -> None:
     radiance = speckled()
     kept = radiance.copy()
     pipeline = ImagePipeline.model_validate_json('{"preset": "webcam", "focus": null}')
-    develop(radiance, None, CAMERA, Weather(lens_drops=0.2), pipeline, rng())
+    develop(take_shot(radiance, None, CAMERA, Weather(lens_drops=0.2), pipeline, rng()))
     assert np.array_equal(radiance, kept)
 
 

@@ -14,7 +14,12 @@ from gen_data.core.se3 import SE3
 from gen_data.core.streams import Streams
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
-from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph, develop
+from gen_data.sensors.camera.image_pipeline import (
+    ImagePipeline,
+    capture_photograph,
+    develop,
+    take_shot,
+)
 from gen_data.sensors.camera.image_sensor import ImageSensor, expose, expose_colors
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh
 
@@ -79,7 +84,7 @@ def test_a_reduced_photograph_is_the_mean_of_the_larger_one() -> None:
     def photo(image: np.ndarray, depth: np.ndarray, lens: Intrinsics, **given: Any) -> np.ndarray:
         camera = Camera("eye", SE3(), lens, ev100=8.0)
         rgb = develop(
-            image.astype(np.float32), depth, camera, Weather(), pipeline(**given), rng()
+            take_shot(image.astype(np.float32), depth, camera, Weather(), pipeline(**given), rng())
         ).rgb
         return rgb.astype(np.float64)
 

@@ -18,7 +18,7 @@ from gen_data.core.se3 import SE3
 from gen_data.core.streams import Rng, Streams
 from gen_data.sensors.camera import isp, optics
 from gen_data.sensors.camera.exposure import ExposureControl, exposure_settings
-from gen_data.sensors.camera.image_pipeline import PRESETS, ImagePipeline, develop
+from gen_data.sensors.camera.image_pipeline import PRESETS, ImagePipeline, develop, take_shot
 from gen_data.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
 from gen_data.sensors.camera.isp import to_bytes
 from gen_data.sensors.device_presets import preset_names
@@ -44,7 +44,7 @@ def made(**values: Any) -> ImagePipeline:
 def photograph(radiance: Any, pipeline: ImagePipeline, stream: Rng | None = None) -> Any:
     """Bytes of a photograph at EV 8 in fair weather."""
     image = np.asarray(radiance, np.float32)
-    return develop(image, FAR, EYE, Weather(), pipeline, stream or rng()).rgb
+    return develop(take_shot(image, FAR, EYE, Weather(), pipeline, stream or rng())).rgb
 
 
 @pytest.mark.parametrize("level", [0.02, 0.1, 0.5, 0.9])
@@ -411,7 +411,7 @@ def test_every_preset_takes_the_same_picture_twice(name: str) -> None:
     """Same stream, same bytes; a picture of a mid-grey scene is neither black nor white."""
     radiance, depth_m = flat(40.0, 45.0, 50.0), np.full((48, 64), 2.0)
     one, two, other = (
-        develop(radiance, depth_m, EYE, Weather(), made(preset=name), rng(stream)).rgb
+        develop(take_shot(radiance, depth_m, EYE, Weather(), made(preset=name), rng(stream))).rgb
         for stream in ("one", "one", "another")
     )
     assert one.shape == (48, 64, 3)
