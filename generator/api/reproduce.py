@@ -1,6 +1,5 @@
 """Reproduction of one sample: the function behind ``gen-data repro``."""
 
-import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.temporary_folders import temporary_folder
 
 if TYPE_CHECKING:
     from gen_data.runner.sample_stages import Difference
@@ -78,10 +78,10 @@ def reproduce(
         regeneration = plan_regeneration(path, plan, other)
         make_pipeline, changes = regeneration.make_pipeline, regeneration.changes
     folder = None if out is None else _make_empty(Path(out))
-    place = tempfile.TemporaryDirectory(prefix="gen-data-repro-") if folder is None else None
-    with threadpool_limits(limits=1), place or nullcontext(str(folder)) as name:
-        with storage_errors(Path(name), ""), make_pipeline() as pipeline:
-            again = write_alone(pipeline, index, Path(name))
+    place = temporary_folder("repro") if folder is None else nullcontext(folder)
+    with threadpool_limits(limits=1), place as written:
+        with storage_errors(written, ""), make_pipeline() as pipeline:
+            again = write_alone(pipeline, index, written)
         digests = again.digests()
         if plan is None:
             return Reproduction(digests)

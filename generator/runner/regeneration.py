@@ -1,7 +1,6 @@
 """Pipelines that make the samples of an existing data set again: by generation or rendering."""
 
 import ast
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from gen_data.assemble.config import parse_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.config.yaml_scalars import json_as_yaml
 from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.temporary_folders import temporary_folder
 from gen_data.runner import finalize, rerender
 from gen_data.runner.identity import format_licences, make_plan
 from gen_data.runner.layout import PLAN_NAME
@@ -92,8 +92,8 @@ def compare_regenerated(
     with ExitStack() as stack:
         pipeline = stack.enter_context(regeneration.make_pipeline())
         for index in indices:
-            with tempfile.TemporaryDirectory(prefix="gen-data-regenerated-") as name:
-                again = write_alone(pipeline, index, Path(name))
+            with temporary_folder("regenerated") as folder:
+                again = write_alone(pipeline, index, folder)
                 stored = SampleFiles(store.shard_dir(index // plan.shard_size), index)
                 difference = compare_samples(stored, again, semantic)
             if difference is not None:

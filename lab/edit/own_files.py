@@ -19,7 +19,7 @@ import numpy as np
 from gen_data.assets.folder_index import PlateEntry
 from gen_data.assets.plates.plate_import import locate_camera
 from gen_data.config.merging import node_name
-from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.errors import AssetError, ConfigError, StorageError
 from gen_data.core.plates import Plate, ground_points
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.core.whole_files import write_whole
@@ -270,7 +270,10 @@ def keep_file(folder: Path, path: Path, checked: Checked) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     index = read_file(folder / "assets.yaml")
     text = index.text or "licence: unknown\n"
-    shutil.copyfile(path, target)
+    try:
+        shutil.copyfile(path, target)
+    except OSError as error:
+        raise StorageError(f"{error.filename}: {error.strerror}; drop {path.name} again") from error
     index.save(text_edits.append_item(text, checked.section, checked.entry))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-import tempfile
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from gen_data.core.errors import ConfigError, GenDataError
+from gen_data.core.temporary_folders import TemporaryFolder
 from gen_data.lab.edit import own_files
 from gen_data.lab.edit.photographs import GROUND, UNKNOWN, Corners, Standpoint, rectangle
 
@@ -66,12 +66,12 @@ class OwnFilesPanel:
         if not name:
             ui.notify("the file has no name that could be kept", type="negative")
             return
-        folder = Path(tempfile.mkdtemp(prefix="gen-data-edit-"))
+        folder = TemporaryFolder("edit")
         self._tab.scratch.append(folder)
-        await event.file.save(folder / name)
+        await event.file.save(folder.path / name)
         event.sender.reset()  # Its own list of files says nothing that the card does not.
         with self._body:
-            OwnFile(self._tab, folder / name)
+            OwnFile(self._tab, folder.path / name)
 
 
 class OwnFile:
@@ -89,6 +89,7 @@ class OwnFile:
         self._ranges: list[Any] = []
         self._card = ui.element("div").classes("gd-field")
         self._card.props["data-file"] = path.name
+        self._jobs = f"{tab.key}/file/{path}"
         with self._card:
             ui.label(path.name).classes("gd-name")
             self._image = ui.interactive_image(
@@ -100,11 +101,16 @@ class OwnFile:
             self._image.set_visibility(False)
             self._facts = ui.label("being checked ...").props('role="status"')
             self._choices = ui.element("div")
+            ui.button("Remove", on_click=self._remove).props("dense no-caps flat").props[
+                "aria-label"
+            ] = f"Remove {path.name}"
         self._check(own_files.CheckFile(path))
 
     def _check(self, job: own_files.CheckFile) -> None:
         self._is_checked.clear()
-        self._tab.desk.order(f"{self._tab.key}/file/{self._path}", [job], self._show)
+        if self._found is not None:
+            self._facts.text = "being checked again ..."
+        self._tab.desk.order(self._jobs, [job], self._show)
 
     def _show(self, ticket: Any, found: Any) -> None:
         self._tab.desk.listeners.pop(ticket.client, None)
@@ -126,6 +132,11 @@ class OwnFile:
             self._build_choices()
         if not has_picture:
             self._scroll()
+
+    def _remove(self) -> None:
+        """Take the card away; the text stays as it is."""
+        self._tab.desk.forget(self._jobs)
+        self._card.delete()
 
     def _take_over(self, used: Standpoint) -> None:
         """Show the tilt and the ground that a check has assumed."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
-import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -20,6 +19,7 @@ from starlette.responses import JSONResponse, Response
 from gen_data.assemble.documents import shipped_text
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import GenDataError
+from gen_data.core.temporary_folders import TemporaryFolder
 from gen_data.lab.edit import completion
 from gen_data.lab.edit.browse_page import BrowsePage
 from gen_data.lab.edit.data_sets import is_data_set
@@ -137,7 +137,7 @@ class EditorTab:
         self._orders: list[Any] = []
         self._tiles: list[Tile] = []
         self.chosen: Shown | None = None
-        self.scratch: list[Path] = []
+        self.scratch: list[TemporaryFolder] = []
 
     def build(self) -> None:
         """Make all widgets, and begin."""
@@ -427,7 +427,7 @@ class EditorTab:
         TABS.pop(self.key, None)
         self.desk.forget(self.key)
         for folder in self.scratch:
-            shutil.rmtree(folder, ignore_errors=True)
+            folder.remove()
         self._task.cancel()
 
 

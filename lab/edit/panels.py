@@ -7,7 +7,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import quote
 
@@ -16,6 +15,7 @@ from nicegui import ui
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core import processes
 from gen_data.core.errors import ConfigError, GenDataError
+from gen_data.core.temporary_folders import TemporaryFolder
 from gen_data.lab.edit import controls, statistics
 from gen_data.lab.edit.document import list_origins
 from gen_data.lab.edit.samples import Recording
@@ -44,7 +44,7 @@ class Tab(Protocol):
     session: Session
     client: Any
     chosen: Shown | None
-    scratch: list[Path]
+    scratch: list[TemporaryFolder]
 
     @property
     def base(self) -> Shown | None: ...  # noqa: D102

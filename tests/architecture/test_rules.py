@@ -30,6 +30,16 @@ def test_functions_stay_short() -> None:
     assert not too_long
 
 
+def test_temporary_folders_have_a_lock() -> None:
+    """Folders of that name without one are removed by any other process after a minute."""
+    bare = [
+        str(path.relative_to(ROOT))
+        for path in python_files(*OURS)
+        if path.name != "temporary_folders.py" and 'prefix="gen-data-' in path.read_text()
+    ]
+    assert not bare
+
+
 def functions_in(node: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
     """Functions among the statements of a module, nested ones included."""
     for child in ast.iter_child_nodes(node):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import tempfile
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -12,6 +14,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.core.temporary_folders import remove_abandoned
 from gen_data.lab.edit.own_files import SIZE_MAX_BYTES
 from gen_data.lab.edit.start_page import picture_name, shipped_configurations
 from tests.edit.live_page import COUNTS, LOADED, Live, set_text, text_of, wait_for_pictures
@@ -72,6 +75,10 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
         assert tilt.input_value() == "30"
         card.locator("[data-standpoint=height_m]").fill("1")
         card.locator("[role=status]:has-text('room for things 1.2 m')").wait_for()
+        # A minute of thought, in which another process clears up.
+        for folder in Path(tempfile.gettempdir()).glob("gen-data-edit-*"):
+            os.utime(folder, (0, 0))
+        remove_abandoned(Path(tempfile.gettempdir()))
         picture = card.locator("img")
 
         def await_another(drawn: str | None) -> None:
