@@ -110,7 +110,8 @@ class LidarSensor(mounting.Mounted):
 
     def describe(self) -> interfaces.SensorInfo:
         """Describe a laser scanner."""
-        return self._info(self.name, interfaces.Modality.LIDAR, origins=self.origins)
+        kept = {"origins": self.origins, "motion_distortion": self.motion_distortion}
+        return self._info(self.name, interfaces.Modality.LIDAR, **kept)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this scanner to its rig, or to its camera.
