@@ -6,13 +6,13 @@
     av2/<split>/<log>/<time>.feather             as annotations of Argoverse 2's challenge
 
 * **kitti**: ``pos1`` [n, 3], ``pos2`` [m, 3], ``gt`` [n, 3], float32: points of this scan and the
-  next one, each in the scanner's frame in the middle of its own sweep (X forward, Y left, Z up),
-  and where those of the first are in the second frame, minus ``pos1``. ``pos1`` lacks points
-  without a flow, for which the format has no mark; ground is included.
+  next one, each in the scanner's frame at the middle of the sweep (X forward, Y left, Z up), and
+  where the first ones are in the second frame, minus ``pos1``. ``pos1`` lacks points without a
+  flow, for which the format has no mark; ground is included.
 * **av2**: ``flow_tx_m``, ``flow_ty_m``, ``flow_tz_m`` (float32), ``is_valid``, ``is_dynamic``
   (moves by at least 5 cm besides the ego's motion), ``is_close`` (at most 35 m along x and y),
   ``category_indices`` (uint8; 0 = none), a row per point of the scan, in the ego's frame of both
-  instants. Logs, times and order of points are those of ``argoverse2``.
+  instants. Logs, times and the order of points are as in ``argoverse2``.
 
 The flow of a point is where its surface is one period of the scanner after the pulse left, minus
 where it was then; the motion of the ego is in it. Returns from the air and by way of mirrors have
@@ -103,8 +103,8 @@ class LidarFlow(base.AssetExporter):
         """Reject a data set whose points have no next scan, or no common frame.
 
         Raises:
-            ConfigError: there is no laser scanner, its scans are raw, samples are no sequences, or
-                a package is missing.
+            ConfigError: there is no laser scanner, its scans are raw, a sequence has only one, or a
+                package is missing.
         """
         if "av2" in self.layouts:
             base.check_installed(self.type, "pyarrow")
@@ -188,7 +188,7 @@ class SceneFlow:
     """Flow of points; arrays are [n].
 
     Attributes:
-        flow_m: Place in the scanner's frame of then, minus place in that of now [m], [n, 3].
+        flow_m: Place in the scanner's frame then, minus place in its frame now [m], [n, 3].
         moved_m: Way in the world [m].
         valid: Whether the point is on a surface whose motion is known.
     """
@@ -225,7 +225,7 @@ def scene_flow(
 
 
 def annotation_bytes(scene: Scene, lidar: str, points: NDArray[np.void], flow: SceneFlow) -> bytes:
-    """Encode an annotation of Argoverse 2's challenge; ``scene`` is that of the scan."""
+    """Encode an annotation of Argoverse 2's challenge; ``scene`` is at the scan's instant."""
     import pyarrow as pa
 
     mount = lidar_mount(scene, lidar)
