@@ -280,6 +280,35 @@ def test_a_slower_scanner_has_its_flow_to_its_next_scan(world: Any, tmp_path: Pa
     np.testing.assert_allclose(gt[ground], (T_then_now.apply(p) - p)[ground], atol=5e-6)
 
 
+@pytest.mark.parametrize(("motion", "moves"), [("deskewed", False), ("none", True)])
+def test_points_are_as_old_as_their_pulses_unless_all_leave_at_once(
+    world: Any, tmp_path: Path, motion: str, moves: bool
+) -> None:
+    """Pulses that left nine seconds before the car and the person set off meet them at rest."""
+    samples = []
+    for sample in world.drive()[:2]:
+        cloud = sample.capture.clouds["top"]
+        points = cloud.points.copy()
+        points["time_s"][points["instance_id"] > 0] = -9.0
+        capture = replace(sample.capture, clouds={"top": replace(cloud, points=points)})
+        samples.append(replace(sample, capture=capture))
+    info = drive_info(world)
+    sensors = tuple(
+        replace(s, motion_distortion=motion) if s.name == "top" else s for s in info.sensors
+    )
+    exporter = LidarFlow(layouts=("kitti",))
+    folder = world.export(exporter, replace(info, sensors=sensors), samples, tmp_path)
+    (scan,) = (folder / "kitti").glob("*/*.npz")
+    true = truth(world, samples[0])
+    expected = true["flow"] if moves else true["flow"] - true["moved"] @ turn_of(world, 0.1)
+    np.testing.assert_allclose(np.load(scan)["gt"], expected, atol=5e-6)
+
+
+def turn_of(world: Any, time_s: float) -> Array:
+    """Rotation of the ego on its drive."""
+    return np.asarray(world.ego_pose(time_s).rotation())
+
+
 @pytest.mark.parametrize(
     ("changes", "sensor", "text"),
     [
