@@ -32,6 +32,7 @@ TABLE = PluginTable[Exporter](
         "label_studio": "gen_data.exporters.label_studio:LabelStudio",
         "language": "gen_data.exporters.language:LanguageJsonl",
         "lerobot": "gen_data.exporters.lerobot:LeRobot",
+        "lidar_flow": "gen_data.exporters.lidar_flow:LidarFlow",
         "map_vectors": "gen_data.exporters.map_vectors:MapVectors",
         "mcap": "gen_data.exporters.mcap:Mcap",
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",

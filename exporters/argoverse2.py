@@ -174,7 +174,7 @@ class Argoverse2(base.AssetExporter):
             mounts |= frame.row["mounts"]
             lenses |= frame.row["lenses"]
             for sensor, ego in frame.row["egos"].items():
-                time_ns = _time_ns(info, number, ego["time_s"])
+                time_ns = time_ns_of(info, number, ego["time_s"])
                 egos[time_ns] = ego["pose"]
                 if sensor in frame.row["lenses"]:
                     suffix = info.encoding(sensor, Channel.RGB).suffix
@@ -207,7 +207,7 @@ def scan_bytes(points: NDArray[np.void], T_ego_lidar: SE3, sweep_s: float) -> by
 
     x, y, z = T_ego_lidar.apply(points["position_m"].astype(np.float64)).astype(np.float32).T
     offset_ns = np.rint((points["time_s"] - 0.5 * sweep_s) * 1e9).astype(np.int32)
-    return _feather(
+    return feather_bytes(
         {
             "x": pa.array(x),
             "y": pa.array(y),
@@ -219,7 +219,7 @@ def scan_bytes(points: NDArray[np.void], T_ego_lidar: SE3, sweep_s: float) -> by
     )
 
 
-def _feather(columns: Mapping[str, Any]) -> bytes:
+def feather_bytes(columns: Mapping[str, Any]) -> bytes:
     """Encode columns as an Arrow file, uncompressed: bytes of codecs depend on their build."""
     import pyarrow as pa
     from pyarrow import ipc
@@ -243,14 +243,15 @@ def _write_table(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> Non
     for name in (first, *columns):
         kind = pa.string() if name in texts else pa.int64() if name in whole else pa.float64()
         made[name] = pa.array([row[name] for row in rows], kind)
-    write_bytes(path, _feather(made))
+    write_bytes(path, feather_bytes(made))
 
 
 def _map_file(world: int) -> str:
     return f"maps/{world:06d}.json"
 
 
-def _time_ns(info: DatasetInfo, number: int, time_s: float) -> int:
+def time_ns_of(info: DatasetInfo, number: int, time_s: float) -> int:
+    """Stamp [ns] of an instant of the sequence of a number."""
     whole_s = -(-info.steps_per_scene * info.step_s // 1)
     start_us = START_US + PAUSE_US + number * (int(whole_s) * 1_000_000 + PAUSE_US)
     return start_us * 1000 + round(time_s * 1e9)

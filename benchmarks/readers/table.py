@@ -227,6 +227,7 @@ READERS: tuple[Reader, ...] = (
 WITHOUT_READER = {
     "argoverse2": "av2 requires torch and kornia; docs/maps.md has the command",
     "culane": "its evaluation is a program in C++, in no registry",
+    "lidar_flow": "av2 requires torch and kornia; FlowNet3D is in no registry",
     "map_vectors": "MapTR is in no registry",
     "opendrive": "our reader; ASAM's checker requires packages of its own (docs/maps.md)",
     "openlane": "its evaluation is in no registry",

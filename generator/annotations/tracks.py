@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.annotations.sight_lines import MIRRORED, SightLines, cast_rays, trace_sight_lines
-from gen_data.annotations.surface_points import SurfacePoints, find_surface_points
 from gen_data.config.base_model import Strict
 from gen_data.core import capture, errors, interfaces, se3
 from gen_data.core.motion import Trajectory
@@ -19,6 +18,7 @@ from gen_data.core.sample import TRACK_STATES, EgoTruth, PointTracks, SensorTrac
 from gen_data.core.scene import Camera, Lidar, Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.core.streams import Rng
+from gen_data.core.surface_points import SurfacePoints, find_surface_points
 
 INSTANTS = 3
 """Steps of a sequence at which points are chosen, evenly spread from the first to the last."""

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
@@ -376,6 +376,8 @@ class SensorInfo:
         time_offset_s: Delay of readings after the step's instant [s].
         rgb_encoding: Cameras: encoding of the files of the rgb channel; others are PNG.
         origins: Laser scanners: whether scans have ``capture.ORIGIN`` records.
+        motion_distortion: Laser scanners: the frame of points: ``raw``, that of each pulse's own
+            instant; ``deskewed``, that of the sweep's middle; ``none``, all pulses leave then.
         needs_clear_view: Whether a position inside the body that carries it is refused.
     """
 
@@ -391,6 +393,7 @@ class SensorInfo:
     needs_clear_view: bool = False
     rgb_encoding: ImageEncoding = PNG
     origins: bool = False
+    motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
 
 
 class Sensor(Protocol):

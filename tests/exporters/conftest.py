@@ -500,6 +500,10 @@ class Props:
             (asset_types.Material(),),
         )
 
+    def bounds_m(self, asset_id: str) -> tuple[Array, Array]:
+        size_m = np.array(SIZES_M[asset_id.rpartition("/")[2]])
+        return size_m * (-0.5, -0.5, 0.0), size_m * (0.5, 0.5, 1.0)
+
     def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         return ()
 

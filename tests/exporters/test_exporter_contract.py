@@ -21,8 +21,8 @@ EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
 NO_CLASS = {"cityscapes", "hdf5", "kitti", "kitti_tracking", "language", "motchallenge"}
 """Formats with a mark for ignored objects that needs no class, or that only mention them."""
 OWN_IMAGES = PACKED | {
-    "hdf5", "lerobot", "mcap", "occupancy", "pointclouds", "semantickitti", "tables", "tapvid",
-    "usd",
+    "hdf5", "lerobot", "lidar_flow", "mcap", "occupancy", "pointclouds", "semantickitti", "tables",
+    "tapvid", "usd",
 }  # fmt: skip
 """Formats without image files of the shards."""
 TRACKS = {"argoverse2", "kitti_raw", "nuscenes"}
@@ -38,6 +38,8 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
     """The seven frames; a drive with cameras, an arm or voxels, or bodies, for their formats."""
     if exporter.type == "kitti_stereo":
         return world.pairs()
+    if exporter.type == "lidar_flow":
+        return drive_info(world), world.drive()
     if exporter.type in ("lerobot", "rlds"):
         return drive_info(world), world.reach()
     if exporter.type == "occupancy":

@@ -110,7 +110,12 @@ class LidarSensor(mounting.Mounted):
 
     def describe(self) -> interfaces.SensorInfo:
         """Describe a laser scanner."""
-        return self._info(self.name, interfaces.Modality.LIDAR, origins=self.origins)
+        return self._info(
+            self.name,
+            interfaces.Modality.LIDAR,
+            origins=self.origins,
+            motion_distortion=self.motion_distortion,
+        )
 
     def mount(self, scene: Scene) -> Scene:
         """Add this scanner to its rig, or to its camera.

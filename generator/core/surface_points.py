@@ -81,7 +81,11 @@ class SurfacePoints:
 
 
 def find_surface_points(
-    scene: Scene, assets: AssetLibrary, p_world: se3.Array, instance_id: NDArray[np.integer]
+    scene: Scene,
+    assets: AssetLibrary,
+    p_world: se3.Array,
+    instance_id: NDArray[np.integer],
+    reach_m: float = REACH_M,
 ) -> tuple[SurfacePoints, Rows]:
     """Find the triangles that places on surfaces [n, 3] belong to.
 
@@ -90,6 +94,7 @@ def find_surface_points(
         assets: Meshes of its bodies.
         p_world: Places, up to the error of a ray [m].
         instance_id: Instance of each, 0 = bodies without one, [n].
+        reach_m: Largest distance from a triangle; see ``REACH_M``.
 
     Returns:
         The points, and the row of each; places without a triangle are left out.
@@ -105,11 +110,11 @@ def find_surface_points(
             continue
         p = item.T_world_body.inverse().apply(p_world[rows]) / item.scale
         low, high = assets.bounds_m(item.asset)
-        near = ((p >= np.subtract(low, REACH_M)) & (p <= np.add(high, REACH_M))).all(axis=1)
+        near = ((p >= np.subtract(low, reach_m)) & (p <= np.add(high, reach_m))).all(axis=1)
         if not near.any():
             continue
-        rows = rows[near]
-        distance_m, faces, shares, places = _nearest_triangles(assets.mesh(item.asset), p[near])
+        rows, mesh = rows[near], assets.mesh(item.asset)
+        distance_m, faces, shares, places = _nearest_triangles(mesh, p[near], reach_m)
         closer = distance_m * item.scale < best_m[rows]
         rows = rows[closer]
         best_m[rows] = distance_m[closer] * item.scale
@@ -123,7 +128,7 @@ def find_surface_points(
 
 
 def _nearest_triangles(
-    mesh: MeshData, p_mesh: se3.Array
+    mesh: MeshData, p_mesh: se3.Array, reach_m: float
 ) -> tuple[se3.Array, Rows, se3.Array, se3.Array]:
     """Distance [m], index, weights and place of the nearest point on a mesh; inf if none is near.
 
@@ -135,13 +140,13 @@ def _nearest_triangles(
     x = np.ascontiguousarray(mesh.vertices_m[:, 0])[mesh.faces.T]
     low, high = x.min(axis=0), x.max(axis=0)
     for k, p in enumerate(p_mesh):
-        reach_m = REACH_M * max(1.0, 0.1 * float(np.abs(p).max()))
-        near = np.flatnonzero((low <= p[0] + reach_m) & (high >= p[0] - reach_m))
+        around_m = reach_m * max(1.0, 0.1 * float(np.abs(p).max()))
+        near = np.flatnonzero((low <= p[0] + around_m) & (high >= p[0] - around_m))
         triangles = mesh.vertices_m[mesh.faces[near]]
         for axis in (1, 2):
             side = triangles[:, :, axis]
-            inside = (side.min(axis=1) <= p[axis] + reach_m) & (
-                side.max(axis=1) >= p[axis] - reach_m
+            inside = (side.min(axis=1) <= p[axis] + around_m) & (
+                side.max(axis=1) >= p[axis] - around_m
             )
             near, triangles = near[inside], triangles[inside]
         if not len(near):
@@ -151,7 +156,7 @@ def _nearest_triangles(
         found = np.einsum("nk,nki->ni", shares, corners, optimize=False)
         away = np.sqrt(((found - p) ** 2).sum(axis=1))
         best = int(away.argmin())
-        if away[best] <= 2.0 * reach_m:
+        if away[best] <= 2.0 * around_m:
             distance_m[k], face[k] = away[best], near[best]
             weights[k], places[k] = shares[best], found[best]
     return distance_m, face, weights, places
