@@ -36,7 +36,7 @@ class LaneLine:
         name: Name of the ``LaneBorder``.
         number: Number of the border in its world, from 1.
         points_px: Image coordinates [n, 2].
-        points_m: Points in the vehicle's frame (``vehicle_pose``) [n, 3].
+        points_m: Points in the level frame below the camera, X along its view, Y left [n, 3].
         visible: Whether each point is visible, bool [n].
         paint: Its paint: the most frequent one of its points.
         is_edge: Whether it is an edge of the carriageway.
@@ -54,7 +54,7 @@ class LaneLine:
 
     @property
     def left_m(self) -> float:
-        """Distance of its nearest point to the left of the vehicle's axis."""
+        """Distance of its nearest point to the left of the camera's view."""
         return float(self.points_m[0, 1])
 
 
@@ -98,6 +98,18 @@ def vehicle_pose(scene: Scene, camera: Camera) -> SE3:
     return camera.T_world_camera.inverse() @ T_world_vehicle
 
 
+def level_pose(scene: Scene, camera: Camera) -> SE3:
+    """``T_level_camera``: X along the view, Y left, Z up; the origin is below the camera.
+
+    Up and the ground (Z = 0) are the vehicle's, but the view may be to its side or back.
+    """
+    T_vehicle_camera = vehicle_pose(scene, camera).inverse()
+    x_m, y_m, _ = T_vehicle_camera.translation_m
+    ahead = T_vehicle_camera.rotate(np.array([0.0, 0.0, 1.0]))
+    yaw = float(np.arctan2(ahead[1], ahead[0]))
+    return SE3.about_z(yaw, (x_m, y_m, 0.0)).inverse() @ T_vehicle_camera
+
+
 def lane_lines(
     sample: Sample, sensor: str, dividers: Mapping[str, Divider], *, edges: bool = True
 ) -> tuple[LaneLine, ...]:
@@ -110,13 +122,13 @@ def lane_lines(
         edges: Whether edges of the carriageway without paint are lines.
     """
     truth, scene = sample.truth[sensor], sample.scene_of(sensor)
-    T_vehicle_camera = vehicle_pose(scene, truth.camera).inverse()
+    T_level_camera = level_pose(scene, truth.camera)
     borders = {b.name: (k, b) for k, b in enumerate(lane_borders(scene.lanes), 1)}
     lines = []
     for stretch in truth.borders or ():
         number, border = borders[stretch.border]
         p_camera = _places(scene, truth.camera, border, stretch)
-        points_m = T_vehicle_camera.apply(p_camera)
+        points_m = T_level_camera.apply(p_camera)
         order = slice(None) if points_m[0, 0] <= points_m[-1, 0] else slice(None, None, -1)
         paint = _common_paint(dividers[border.name], truth.camera.T_world_camera.apply(p_camera))
         is_edge = border.kind == "edge"
@@ -189,7 +201,7 @@ def _numbered(lines: Sequence[LaneLine]) -> Iterator[LaneLine]:
 
 
 def _is_own(line: LaneLine) -> bool:
-    """Whether a line begins near the vehicle and leads ahead."""
+    """Whether a line begins near the camera and leads away from it."""
     step = line.points_m[min(5, len(line.points_m) - 1)] - line.points_m[0]
     ahead = step[0] / np.hypot(step[0], step[1]) if step[:2].any() else 0.0
     return bool(0.0 < line.points_m[0, 0] < NEAR_M and ahead > ALONG)

@@ -39,7 +39,13 @@ from gen_data.core.scene_time import RIG_AXES
 from gen_data.core.se3 import Array
 from gen_data.exporters import base, fragments, image_files
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.lane_lines import LaneLine, PaintedWorlds, lane_lines, vehicle_pose
+from gen_data.exporters.lane_lines import (
+    LaneLine,
+    PaintedWorlds,
+    lane_lines,
+    level_pose,
+    vehicle_pose,
+)
 from gen_data.exporters.nuscenes_frames import intrinsic_rows
 from gen_data.exporters.sensor_selection import check_pinholes, photographs, rgb_cameras
 from gen_data.exporters.sequences import (
@@ -113,6 +119,7 @@ def frame(sample: Sample, sensor: str, lines: Iterable[LaneLine]) -> dict[str, A
     """Content of the file of a photograph, without ``file_path``."""
     scene, camera = sample.scene_of(sensor), sample.truth[sensor].camera
     T_vehicle_camera = vehicle_pose(scene, camera).inverse() @ RIG_AXES
+    T_camera_level = (level_pose(scene, camera) @ RIG_AXES).inverse()
     return {
         "intrinsic": intrinsic_rows(camera.intrinsics),
         "extrinsic": np.round(T_vehicle_camera.matrix(), 9).tolist(),
@@ -121,7 +128,7 @@ def frame(sample: Sample, sensor: str, lines: Iterable[LaneLine]) -> dict[str, A
                 "category": category(line),
                 "visibility": [float(seen) for seen in line.visible],
                 "uv": _rows(line.points_px - 0.5),
-                "xyz": _rows(T_vehicle_camera.inverse().apply(line.points_m)),
+                "xyz": _rows(T_camera_level.apply(line.points_m)),
                 "attribute": ATTRIBUTES.get(line.side, 0),
                 "track_id": line.number,
             }

@@ -5,7 +5,7 @@ sequence after the other. Unchanged values are not sent again. Rerun's quaternio
 boxes have half sizes; a pinhole's principal point is as in this project (pixel centres at i + 0.5).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,9 +27,17 @@ from gen_data.core import (
 )
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.capture import LAYERS, Capture, Channel, PointCloud, SensorReading
-from gen_data.core.sample import TRACK_STATES, ImageTruth, Occupancy, Sample, SensorTracks
+from gen_data.core.lane_geometry import LaneBorder
+from gen_data.core.sample import (
+    TRACK_STATES,
+    BorderTruth,
+    ImageTruth,
+    Occupancy,
+    Sample,
+    SensorTracks,
+)
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.preview import overlay, palette, sensor_views, voxel_view
+from gen_data.preview import lane_view, overlay, palette, sensor_views, voxel_view
 
 TIMELINE = "sample"
 TIME = "time"
@@ -49,7 +57,7 @@ TARGET_M = 2.0
 WAY_M = 0.1
 """Shortest trajectory to show."""
 LIFT_M = 0.05
-"""Height of trajectories above the path of a body's origin."""
+"""Height of trajectories above the path of a body's origin, and of lanes above the ground."""
 
 
 @dataclass
@@ -68,6 +76,7 @@ class Recorder:
     points: sensor_views.PointColors = "class"
     _sent: dict[str, tuple[Any, ...]] = field(default_factory=dict)
     _skeletons: dict[int, skeletons.Skeleton] = field(default_factory=dict)
+    _borders: tuple[LaneBorder, ...] = ()
     _sequence: int = -1
     _is_open: bool = False
 
@@ -120,6 +129,10 @@ class Recorder:
             self.stream.log("world/boxes", boxes_3d(sample))
         if sample.frame is not None and sample.frame.occupancy is not None:
             self._record_voxels(sample.frame.occupancy, sample.scene)
+        borders = () if sample.frame is None else sample.frame.borders or ()
+        if borders != self._borders:
+            self._borders = borders
+            self.stream.log("world/lanes", lane_strips_3d(borders))
         tracks = None if sample.frame is None else sample.frame.tracks
         if tracks is not None:
             places = rr.Points3D(tracks.position_m, colors=point_colors(len(tracks.position_m)))
@@ -232,6 +245,8 @@ class Recorder:
                 colored = rr.Image(overlay.channel_image(reading, channel)).compress(90)
                 self.stream.log(f"channels/{name}/{channel.value}", colored)
         self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
+        if truth.borders is not None:
+            self.stream.log(f"{path}/image/lanes", lane_strips_2d(truth.borders))
         self._record_keypoints(f"{path}/image/keypoints", truth)
 
     def _record_keypoints(self, path: str, truth: ImageTruth) -> None:
@@ -419,6 +434,25 @@ def boxes_2d(truth: ImageTruth) -> rr.Boxes2D:
         sizes=[(item.box.width_px, item.box.height_px) for item in items if item.box],
         labels=[overlay.title(item) for item in items],
         class_ids=[item.instance.category_id for item in items],
+    )
+
+
+def lane_strips_3d(borders: Sequence[LaneBorder]) -> rr.LineStrips3D:
+    """Convert borders of lanes in the world, coloured by kind."""
+    return rr.LineStrips3D(
+        [np.add(border.points_m, (0.0, 0.0, LIFT_M)) for border in borders],
+        colors=[lane_view.border_color(border.kind) for border in borders],
+        radii=rr.Radius.ui_points(1.0),
+    )
+
+
+def lane_strips_2d(borders: Sequence[BorderTruth]) -> rr.LineStrips2D:
+    """Convert borders of lanes in an image; hidden parts are darker and thinner."""
+    parts = [(b.kind, seen, line) for b in borders for seen, line in lane_view.split_border(b)]
+    return rr.LineStrips2D(
+        [line for _, _, line in parts],
+        colors=[lane_view.border_color(kind, visible=seen) for kind, seen, _ in parts],
+        radii=[-1.5 if seen else -0.75 for _, seen, _ in parts],
     )
 
 

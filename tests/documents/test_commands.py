@@ -20,6 +20,7 @@ NOT_RUN = {
     "pip install": "`.ci/bare_root` installs every extra",
     "LABEL_STUDIO_": "starts a server",
     "rerun ": "opens a window",
+    "qc_opendrive ": "a checker that no extra installs, and a configuration of one's own",
     "gen-data edit ": "serves until it is interrupted; tests/edit/test_browser.py",
     "gen-data match ": "reads recordings of one's own; tests/end_to_end/test_match.py has some",
     "gen-data --config matched.yaml": "uses the result of the command before it",

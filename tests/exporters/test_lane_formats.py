@@ -220,6 +220,31 @@ def test_a_camera_on_no_rig_has_its_vehicle_on_the_ground_below_it(
     np.testing.assert_allclose(row["extrinsic"], expected, atol=1e-3)
 
 
+@pytest.mark.parametrize("yaw", [np.pi, 2.0])
+def test_lines_of_a_camera_do_not_depend_on_the_front_of_its_vehicle(
+    openlane: Any, world: Any, tmp_path: Path, yaw: float
+) -> None:
+    """A camera at the back or side of a turned vehicle, at the same place in the world."""
+    one = sample()
+    truth = one.truth["front"]
+    T_rig_camera = SE3.about_z(yaw, (-0.8, 0.3, 0.0)) @ truth.camera.T_rig_camera
+    camera = replace(truth.camera, T_rig_camera=T_rig_camera)
+    turned = replace(one, truth={"front": replace(truth, camera=camera)})
+    folder = write(world, OpenLane(), tmp_path, turned)
+    row = json.loads((folder / f"lane3d_1000/training/{NAME}.json").read_text())
+    found, expected = leading_away(row), leading_away(openlane)
+    assert {1, 2, 3} <= {line["attribute"] for line in found}
+    for line, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(line["xyz"], other["xyz"], atol=2e-4)
+        assert {**line, "xyz": 0} == {**other, "xyz": 0}
+    np.testing.assert_allclose(row["extrinsic"], (T_rig_camera @ RIG_AXES).matrix(), atol=1e-8)
+
+
+def leading_away(row: dict[str, Any]) -> list[dict[str, Any]]:
+    """Lines that have a nearest end: roads square to the view have none."""
+    return [line for line in row["lane_lines"] if np.ptp(line["xyz"][0]) > 0.1]
+
+
 @pytest.fixture(scope="module")
 def culane(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(world, CULane(edges=True), tmp_path_factory.mktemp("culane"))

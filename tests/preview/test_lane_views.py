@@ -1,0 +1,99 @@
+"""Borders of lanes on contact sheets and in Rerun."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gen_data.core.capture import Capture, Channel, SensorReading
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lane_geometry import LaneBorder
+from gen_data.core.sample import BorderTruth, EgoTruth, ImageTruth, Sample
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.se3 import SE3
+from gen_data.preview.contact_sheet import make_tiles
+from gen_data.preview.lane_view import COLORS, HIDDEN, split_border
+from gen_data.preview.rerun_recording import LIFT_M, Recorder
+from tests.preview.test_track_views import _Stream
+
+CAMERA = Camera("color", SE3(), Intrinsics(80, 60, 50.0, 50.0, 40.0, 30.0))
+PATH = "world/cameras/color/image/lanes"
+PLACES = ((10.5, 50.5), (10.5, 40.5), (10.5, 30.5), (10.5, 20.5), (10.5, 10.5))
+HALF_HIDDEN = BorderTruth("a:left", "lane", PLACES, (True, True, False, False, True))
+EDGE = BorderTruth("a:right", "edge", ((60.5, 50.5), (60.5, 10.5)), (True, True))
+WORLD = (
+    LaneBorder("a:left", "lane", ((0, 2, 1), (9, 2, 3))),
+    LaneBorder("a:right", "edge", ((0, -2, 1), (9, -2, 3))),
+)
+
+
+def sample(index: int = 0, world: tuple[LaneBorder, ...] | None = WORLD) -> Sample:
+    """A border of which the middle is hidden, and an edge, in a grey image."""
+    grey = {Channel.RGB: np.full((60, 80, 3), 90, np.uint8)}
+    borders = None if world is None else (HALF_HIDDEN, EDGE)
+    return Sample(
+        index, 0, 0, "train", Scene("s", cameras=(CAMERA,)),
+        Capture({"color": SensorReading("color", CAMERA, grey)}),
+        {"color": ImageTruth(CAMERA, (), borders=borders)}, frame=EgoTruth(borders=world),
+    )  # fmt: skip
+
+
+def test_a_border_is_split_where_it_disappears() -> None:
+    """The segment to a hidden point is hidden; parts meet."""
+    assert list(split_border(HALF_HIDDEN)) == [(True, PLACES[:2]), (False, PLACES[1:])]
+    assert list(split_border(replace(HALF_HIDDEN, visible=(True,) * 5))) == [(True, PLACES)]
+
+
+def test_sheets_show_borders_in_the_colours_of_their_kinds_and_hidden_parts_darker() -> None:
+    (tile,) = make_tiles([sample()], {"color": (Channel.RGB,)}, labels=True)
+    image = tile.image
+    np.testing.assert_array_equal(image[42:50, 10], np.tile(COLORS["lane"], (8, 1)))
+    dark = np.rint(HIDDEN * np.array(COLORS["lane"]))
+    # A smooth line of one pixel covers a tenth less of its pixels, a fifth less where parts meet.
+    shares = (image[12:36, 10] - 90.0) / (dark - 90.0)
+    assert (shares > 0.8).all()
+    assert (shares <= 1.0).all()
+    np.testing.assert_array_equal(image[12:48, 60], np.tile(COLORS["edge"], (36, 1)))
+    assert (image[:, 15:55] == 90).all()
+    (plain,) = make_tiles([sample()], {"color": (Channel.RGB,)}, labels=False)
+    assert (plain.image == 90).all()
+
+
+def test_rerun_has_borders_in_the_world_and_their_visible_and_hidden_parts_in_the_image() -> None:
+    """Strips in the world are just above the ground."""
+    stream = _Stream()
+    recorder = Recorder(stream, None, DatasetInfo("t", 1, 1, 1, (), ()))  # type: ignore[arg-type]
+    recorder.record(sample())
+    (world,) = stream.logged["world/lanes"]
+    strips = np.array(world.strips.as_arrow_array().to_pylist())  # type: ignore[attr-defined]
+    np.testing.assert_allclose(strips, [np.add(b.points_m, (0, 0, LIFT_M)) for b in WORLD])
+    assert colors_of(world) == [COLORS["lane"], COLORS["edge"]]
+
+    (image,) = stream.logged[PATH]
+    lines = image.strips.as_arrow_array().to_pylist()  # type: ignore[attr-defined]
+    parts = [PLACES[:2], PLACES[1:], EDGE.points_px]
+    assert lines == [[list(place) for place in part] for part in parts]
+    dark = tuple(round(HIDDEN * value) for value in COLORS["lane"])
+    assert colors_of(image) == [COLORS["lane"], dark, COLORS["edge"]]
+    assert image.radii.as_arrow_array().to_pylist() == [-1.5, -0.75, -1.5]  # type: ignore[attr-defined]
+
+
+def colors_of(strips: object) -> list[tuple[int, ...]]:
+    """Colours without their alpha, which is 255."""
+    packed = strips.colors.as_arrow_array().to_pylist()  # type: ignore[attr-defined]
+    assert all(color & 255 == 255 for color in packed)
+    return [(color >> 24, color >> 16 & 255, color >> 8 & 255) for color in packed]
+
+
+def test_rerun_gets_lanes_of_the_world_once_per_scene_and_none_without_the_annotation() -> None:
+    stream = _Stream()
+    recorder = Recorder(stream, None, DatasetInfo("t", 1, 1, 1, (), ()))  # type: ignore[arg-type]
+    recorder.record(sample(0, world=None))
+    assert not {"world/lanes", PATH} & set(stream.logged)
+    recorder.record(sample(1))
+    stream.logged.clear()
+    recorder.record(sample(2))
+    assert "world/lanes" not in stream.logged
+    recorder.record(sample(3, world=WORLD[:1]))
+    (world,) = stream.logged["world/lanes"]
+    assert len(world.strips.as_arrow_array()) == 1  # type: ignore[attr-defined]
