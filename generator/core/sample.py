@@ -93,7 +93,7 @@ class ObjectTruth:
         occlusion: Share of the silhouette inside the image that other things hide (visibility).
         truncation: Share of the silhouette that lies outside the image (visibility).
         detectability: Contrast of the visible pixels to the pixels around them over the noise:
-            d' of the ideal observer (detectability); None without a photograph too.
+            d' of the ideal observer; None without a photograph too (detectability).
         part_px: Visible pixels per part name, for instances with parts (part_masks).
         keypoints: In the order of ``instance.keypoints``; empty if it has none (keypoints).
         lidar_points: Points of each laser scanner on the instance, by sensor; None without one.
