@@ -37,7 +37,6 @@ from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.core.scene import Lane
 from gen_data.core.se3 import SE3
 from gen_data.exporters import base, image_files
 from gen_data.exporters.argoverse_map import argoverse_map
@@ -138,10 +137,10 @@ class Argoverse2(base.AssetExporter):
         self.check(info)
         lidar, folder = laser_scanner(info, self.lidar, self.type), shard_dir / self.type
         rows = []
-        maps: dict[int, tuple[Lane, ...]] = {}
+        mapped: set[int] = set()
         for sample in samples:
-            if sample.scene_index not in maps:
-                maps[sample.scene_index] = sample.scene.lanes
+            if sample.scene_index not in mapped:
+                mapped.add(sample.scene_index)
                 roads = argoverse_map(road_map(sample.scene, self.library))
                 write_json(folder / _map_file(sample.scene_index), roads)
             row = _row(info, sample, lidar)
