@@ -287,10 +287,12 @@ class EditorTab:
         checks = [Check(orders[0].text, orders[0].file)] if orders else []
         self.desk.order(f"{self.key}/check", checks, self._receive_check)
         self._orders = orders or self._orders
-        if orders and not self.session.results:
-            self._busy.text = "starting a process that renders ..."
-        elif not orders:
+        if not orders:
             self._busy.text = ""
+        elif self.session.results:
+            self._busy.text = f"drawing {len(orders)} samples ..."
+        else:
+            self._busy.text = "starting a process that renders ..."
         self._show_tiles()
 
     def _receive(self, ticket: Ticket, result: Shown | Refused) -> None:

@@ -171,10 +171,8 @@ class Session:
         sensors = self.config.probes[0].sensors if self.config else ()
         sized = [one for one in sensors if getattr(one, "size_px", None)]
         wanted = [one for one in sized if one.name == self.grid.view.sensor]
-        for one in (*wanted, *sized):
-            width_px, height_px = one.size_px
-            return int(width_px), int(height_px)
-        return 4, 3
+        size_px = getattr(next(iter((*wanted, *sized)), None), "size_px", (4, 3))
+        return int(size_px[0]), int(size_px[1])
 
     def set_field(self, section: str, name: str, path: Sequence[str | int], value: Any) -> str:
         """The text with another value of a field of a named item, or of a section (no name).
