@@ -44,6 +44,7 @@ class Control:
         value: Plain data of the configuration, or the default.
         form: Name of its distribution; empty for a constant.
         low, high, step: Of the slider.
+        legal: Legal values, which may go beyond the slider; empty = any, or no numbers.
         options: Legal values of a choice; outcomes of weights.
         help: Type, default and description.
         place: ``file:line`` that gives the value; empty for a default.
@@ -56,6 +57,7 @@ class Control:
     low: float = 0.0
     high: float = 1.0
     step: float = 0.01
+    legal: str = ""
     options: tuple[Any, ...] = ()
     help: str = ""
     place: str = ""
@@ -134,7 +136,18 @@ def _control(model: FieldSchema, name: str, node: Node | None) -> Control:
     if kind not in ("number", "range", "normal", "chance"):
         return Control(name, kind, form=form, **known)
     low, high, step = _extent(field, value, form, is_angle=name.endswith("_deg"))
-    return Control(name, kind, form=form, low=low, high=high, step=step, **known)
+    legal = "" if form == "probability" else _legal(field)
+    return Control(name, kind, form=form, low=low, high=high, step=step, legal=legal, **known)
+
+
+def _legal(field: FieldSchema) -> str:
+    """Legal values of a field of numbers, in words."""
+    limits = next((one.limits for one in (field, *field.branches) if one.limits), None)
+    if limits is None:
+        return ""
+    low = f"{'above' if limits.open_low else 'from'} {limits.low:g}"
+    high = f"{'below' if limits.open_high else 'to'} {limits.high:g}"
+    return " ".join(text for text in (low, high) if not text.endswith("inf"))
 
 
 def _kind(field: FieldSchema, value: Any, form: str) -> tuple[str, Sequence[Any]]:
