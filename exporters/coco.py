@@ -108,7 +108,7 @@ from gen_data.exporters.fragments import (
     write_fragments,
 )
 from gen_data.exporters.lens_fields import lens_fields
-from gen_data.exporters.sensor_selection import check_channels, instant_s, photographs
+from gen_data.exporters.sensor_selection import check_channels, photographs, stamp_s
 
 DECIMALS = 9
 """Decimals of metres, matrices and fractions: far below any measurement error."""
@@ -339,7 +339,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     if info.steps_per_scene > 1:
         row["sequence_id"] = sequences.sequence_number(info, sample.index)
         row["frame_id"] = sample.index % info.steps_per_scene
-        row["time_s"] = round(instant_s(sample, sensor), DECIMALS)
+        row["time_s"] = round(stamp_s(sample, sensor), DECIMALS)
     return row
 
 

@@ -54,7 +54,7 @@ from gen_data.exporters.parquet_tables import (
     table_schema,
     value_feature,
 )
-from gen_data.exporters.sensor_selection import instant_s, photographs, rgb_camera, rgb_cameras
+from gen_data.exporters.sensor_selection import photographs, rgb_camera, rgb_cameras, stamp_s
 
 if TYPE_CHECKING:
     import pyarrow
@@ -287,7 +287,7 @@ def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "scene": sample.scene_index,
         "view": sample.view_index,
         "step": sample.step_index,
-        "time_s": round(instant_s(sample, sensor), DECIMALS),
+        "time_s": round(stamp_s(sample, sensor), DECIMALS),
         "sensor": sensor,
         "K": camera.intrinsics.matrix().ravel().tolist(),
         **({"lens": _lens(camera.intrinsics.lens)} if has_bent_camera(info) else {}),

@@ -181,9 +181,9 @@ class KittiRaw(base.ExporterBase):
         carrier = camera_mount(sample.scene, cameras["02"]).rig
         unit = navigation_mount(sample.scene, self.oxts, carrier, self.type)
         row = frame_facts(info, sample) | {
-            "time_s": sample.scene.time_s,
+            "time_s": sensor_selection.stamp_s(sample, self.oxts),
             "cameras": {
-                number: sensor_selection.instant_s(sample, name)
+                number: sensor_selection.stamp_s(sample, name)
                 for number, name in cameras.items()
                 if name in sample.truth
             },
@@ -196,7 +196,7 @@ class KittiRaw(base.ExporterBase):
             points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
             path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
             write_bytes(path, point_cloud_io.xyzi_bytes(points))
-            row["scan"] = sweep_times_s(points, sensor_selection.instant_s(sample, lidar))
+            row["scan"] = sweep_times_s(points, sensor_selection.stamp_s(sample, lidar))
         return row
 
     def _write_grey(self, cameras: Mapping[str, str], sample: Sample, shard_dir: Path) -> None:

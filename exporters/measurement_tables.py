@@ -27,6 +27,7 @@ from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import SAMPLE, Conventions
 from gen_data.exporters.npz import npy_bytes
+from gen_data.exporters.sensor_selection import stamp_s
 from gen_data.exporters.sequences import write_json, write_text
 
 INDEX = "sample"
@@ -166,7 +167,7 @@ def _pose(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     return {
         "index": sample.index,
         "sequence": sample.index // info.steps_per_scene,
-        "time_s": sample.scene.time_s,
+        "time_s": stamp_s(sample, sensor),
         "model": device.model,
         "T_rig_device": device.T_rig_device.matrix().tolist(),
         "T_world_device": device.T_world_device.matrix().tolist(),

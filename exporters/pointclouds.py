@@ -31,7 +31,7 @@ from gen_data.core.scene import Instance
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters import base, image_files, point_cloud_io
 from gen_data.exporters.conventions import POINT_TIME, READING, Conventions
-from gen_data.exporters.sensor_selection import has_scans, instant_s
+from gen_data.exporters.sensor_selection import has_scans, stamp_s
 
 FILE_POINT = np.dtype(
     [
@@ -110,7 +110,7 @@ class PointClouds(base.ExporterBase):
         scanner = point_cloud_io.scanner_at_sweep(sample, lidar)
         return {
             "index": sample.index,
-            "time_s": instant_s(sample, lidar),
+            "time_s": stamp_s(sample, lidar),
             "sweep_s": scanner.sweep_s,
             "point_time": self.point_time,
             "model": scanner.model,

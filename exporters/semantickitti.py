@@ -158,7 +158,7 @@ class SemanticKitti(base.ExporterBase):
             write_bytes(stem.with_suffix(".label"), point_labels(points, sample.scene).tobytes())
             row = {
                 "scene": sample.scene_index,
-                "time_s": sensor_selection.instant_s(sample, lidar),
+                "time_s": sensor_selection.stamp_s(sample, lidar),
                 "T_world_camera": mounted_pose(sample.scene, camera_mount(sample.scene, camera)),
                 "calib": _calib(sample.scene, camera, lidar),
             }

@@ -42,7 +42,7 @@ from gen_data.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
 from gen_data.exporters import base, fragments, image_files, label_png
 from gen_data.exporters.conventions import EDGES, PINHOLE, READING, Conventions
 from gen_data.exporters.id_colors import id_color, id_colors
-from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_camera, rgb_cameras
+from gen_data.exporters.sensor_selection import check_pinholes, rgb_camera, rgb_cameras, stamp_s
 from gen_data.exporters.sequences import frame_facts, write_bytes, write_json
 
 FORMAT_VERSION = "1.0.0-preview.1"
@@ -117,7 +117,7 @@ class Solo(base.ExporterBase):
                 _write_segmentation(folder, sample, name)
             if cameras:
                 captures = [_capture(info, sample, name) for name in cameras]
-                time_s = round(instant_s(sample, cameras[0]), 9)
+                time_s = round(stamp_s(sample, cameras[0]), 9)
                 rows.append({**frame_facts(info, sample), "time_s": time_s, "captures": captures})
         fragments.write_fragment(folder, FRAMES, rows)
 

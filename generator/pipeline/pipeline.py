@@ -19,6 +19,7 @@ from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline
 from gen_data.pipeline.numerics import numerics_digests
 from gen_data.pipeline.scene_stages import finish_settled, finish_view
+from gen_data.sensors.sensor_faults import deliver
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -253,6 +254,7 @@ class Pipeline:
             scene = timeline.at(time_s + self._offsets_s[sensor.name])
             with _timed(timings_s, "render"):
                 seen = sensor.capture(scene, self.renderer, self.config.channels, rng)
+                seen = deliver(sensor, seen, rng)
             if isinstance(seen, PointCloud):
                 clouds[sensor.name] = seen
             elif isinstance(seen, Measurements):

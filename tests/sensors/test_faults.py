@@ -20,6 +20,7 @@ from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_faults import LidarFaults
 from gen_data.sensors.navigation import gnss, imu
 from gen_data.sensors.navigation.navigation_faults import GnssFaults, ImuFaults
+from gen_data.sensors.sensor_faults import Clock
 
 W, H = 64, 48
 CAMERA = Camera("color", SE3(), Intrinsics(W, H, 50.0, 50.0, W / 2, H / 2), ev100=5.0)
@@ -186,6 +187,49 @@ def test_imu_biases_step_and_stay() -> None:
     half = replace(still, rows=still.rows[:120])
     early = faults.apply(half, imu.AXES, stream()).faults.get("bias_steps", [])
     assert early == [row for row in found.faults["bias_steps"] if row[0] <= TIMES_S[119]]
+
+
+def clock(**fields: float) -> Clock:
+    return Clock.model_validate_json(json.dumps(fields))
+
+
+def test_a_drifting_clock_is_one_through_a_sequence_and_another_in_the_next() -> None:
+    drawn = Clock.model_validate_json(
+        '{"offset_s": {"uniform": [-1, 1]}, "drift_ppm": {"uniform": [-500, 500]}}'
+    )
+
+    def record(time_s: float, step: int, seed: int = 5) -> Any:
+        return drawn.stamp(replace(CLEAN, time_s=time_s), stream(step, seed)).faults["clock"]
+
+    first, later = record(0.0, 0), record(3.0, 7)
+    assert first["reported_s"] == pytest.approx(first["offset_s"], abs=1e-9)
+    assert {k: later[k] for k in ("offset_s", "drift_ppm")} == {
+        k: first[k] for k in ("offset_s", "drift_ppm")
+    }
+    expected_s = 3.0 + later["offset_s"] + 3.0 * 1e-6 * later["drift_ppm"]
+    assert later["reported_s"] == pytest.approx(expected_s, abs=1e-9)
+    assert record(0.0, 0, seed=6)["offset_s"] != first["offset_s"]
+
+
+def test_jitter_is_normal_and_of_each_stamp_and_the_record_has_the_truth() -> None:
+    """Half a second between rows: errors of 10 ms never change their order."""
+    readings = table(imu.COLUMNS)
+    found = clock(jitter_s=0.01).stamp(readings, stream())
+    error_s = found.rows["time_s"] - TIMES_S
+    assert found.faults["clock"]["true_s"] == TIMES_S.tolist()
+    assert len(np.unique(error_s)) == len(TIMES_S)
+    assert abs(error_s.mean()) < 4 * 0.01 / math.sqrt(len(TIMES_S))
+    assert error_s.std() == pytest.approx(0.01, rel=4 / math.sqrt(2 * len(TIMES_S)))
+    assert (found.rows[list(imu.AXES)] == readings.rows[list(imu.AXES)]).all()
+
+
+def test_stamps_of_one_reading_keep_their_order_and_equal_instants_stay_equal() -> None:
+    times_s = np.repeat(np.arange(100) / 1000.0, 2)
+    rows = table_rows(imu.COLUMNS, 200, time_s=times_s)
+    readings = Measurements("device", Device("device", "imu", "ego"), rows)
+    stamps_s = clock(jitter_s=0.01).stamp(readings, stream()).rows["time_s"]
+    assert (np.diff(stamps_s) >= 0.0).all()
+    assert (stamps_s[::2] == stamps_s[1::2]).all()
 
 
 def test_labels_hold_the_truth_about_faults_and_are_as_before_without() -> None:
