@@ -87,6 +87,7 @@ from gen_data.core import boxes, intrinsics, se3, serialization
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.motion import Twist
+from gen_data.core.reported import reported
 from gen_data.core.sample import (
     ANNOTATION_STRIDE,
     ImageTruth,
@@ -332,7 +333,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "K": _rows(camera.intrinsics.matrix()),
         **lens_fields(camera.intrinsics.lens),
         **_shutter(camera.shutter),
-        "T_world_camera": _rows(camera.T_world_camera.matrix()),
+        "T_world_camera": _rows(reported(camera).T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
     } | _image_keys(sample.scene_of(sensor), sample.truth[sensor], camera.intrinsics)

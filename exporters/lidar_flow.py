@@ -228,7 +228,7 @@ def annotation_bytes(scene: Scene, lidar: str, points: NDArray[np.void], flow: S
     """Encode an annotation of Argoverse 2's challenge; ``scene`` is at the scan's instant."""
     import pyarrow as pa
 
-    mount = lidar_mount(scene, lidar)
+    mount = lidar_mount(scene, lidar, true=True)
     T_ego_lidar = relative_pose(scene, Mount(mount.rig, SE3()), mount)
     p_ego = T_ego_lidar.apply(points["position_m"].astype(np.float64))
     flow_ego = np.asarray(T_ego_lidar.rotate(flow.flow_m)).astype(np.float32)

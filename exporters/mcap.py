@@ -46,7 +46,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from gen_data.core import capture, errors, intrinsics, se3, serialization
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.reported import reported_s
+from gen_data.core.reported import reported, reported_s
 from gen_data.core.sample import ImageTruth, Sample
 from gen_data.core.scene import Camera, Instance, Lidar
 from gen_data.core.scene_time import scene_at
@@ -177,18 +177,18 @@ def _by_time_and_frame(item: tuple[tuple[int, str], Any]) -> tuple[int, str]:
 def _camera_transforms(camera: Camera, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:
     frame = f"camera/{camera.name}"
     if not camera.rig:
-        return [(time_s, WORLD, frame, camera.T_world_camera)]
+        return [(time_s, WORLD, frame, reported(camera).T_world_camera)]
     rig, T_rig_camera = f"rig/{camera.rig}", camera.T_rig_camera
     T_world_rig = camera.T_world_camera @ T_rig_camera.inverse()
-    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, T_rig_camera)]
+    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, reported(camera).T_rig_camera)]
 
 
 def _lidar_transforms(lidar: Lidar, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:
     frame = f"lidar/{lidar.name}"
     if not lidar.rig:
-        return [(time_s, WORLD, frame, lidar.T_world_lidar)]
+        return [(time_s, WORLD, frame, reported(lidar).T_world_lidar)]
     rig, T_world_rig = f"rig/{lidar.rig}", lidar.T_world_lidar @ lidar.T_rig_lidar.inverse()
-    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, lidar.T_rig_lidar)]
+    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, reported(lidar).T_rig_lidar)]
 
 
 def world_boxes(sample: Sample) -> list[tuple[Instance, OrientedBox]]:

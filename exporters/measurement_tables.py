@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from gen_data.core import capture, measurement_dtypes
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import DatasetInfo, SensorInfo, table_path
+from gen_data.core.reported import reported
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
@@ -163,7 +164,7 @@ def _columns(info: DatasetInfo) -> dict[str, Any]:
 
 
 def _pose(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
-    device = sample.scene.device(sensor)
+    device = reported(sample.scene.device(sensor))
     return {
         "index": sample.index,
         "sequence": sample.index // info.steps_per_scene,

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from gen_data.core import boxes, errors
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import reported
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Instance
 from gen_data.core.serialization import canonical_json
@@ -114,7 +115,7 @@ class PointClouds(base.ExporterBase):
             "sweep_s": scanner.sweep_s,
             "point_time": self.point_time,
             "model": scanner.model,
-            "T_world_lidar": scanner.T_world_lidar.matrix().tolist(),
+            "T_world_lidar": reported(scanner).T_world_lidar.matrix().tolist(),
             "boxes": [
                 {
                     "instance": thing.instance_id,

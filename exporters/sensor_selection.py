@@ -1,6 +1,6 @@
 """Selection of the sensors that a format exports."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +88,21 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
             f"exporter '{exporter}': {', '.join(bent)}, but the format holds rectified images; add "
             "rectify: true to the exporter, list the others in its cameras:, use a pinhole, or "
             "export such images as coco"
+        )
+
+
+def check_calibrations(info: DatasetInfo, cameras: Collection[str], exporter: str) -> None:
+    """Reject errors of calibrations in a format whose cameras are parallel by definition.
+
+    Raises:
+        ConfigError: one of several cameras has the fault ``extrinsics``.
+    """
+    wrong = [name for name in cameras if "extrinsics" in info.sensor(name).faults]
+    if wrong and len(cameras) > 1:
+        raise ConfigError(
+            f"exporter '{exporter}': sensor '{wrong[0]}': faults.extrinsics: the format's images "
+            "are rectified and its cameras parallel; remove the fault, export one camera, or use "
+            "another format, such as nuscenes or calibration"
         )
 
 

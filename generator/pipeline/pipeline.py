@@ -19,7 +19,7 @@ from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline
 from gen_data.pipeline.numerics import numerics_digests
 from gen_data.pipeline.scene_stages import finish_settled, finish_view
-from gen_data.sensors.sensor_faults import deliver
+from gen_data.sensors.sensor_faults import deliver, with_calibrations
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -206,7 +206,8 @@ class Pipeline:
         """
         timings = dict(timings_s or {})
         with _timed(timings, "randomize"):
-            timeline = Timeline(view.scene, self.assets, self._category_ids)
+            begun = with_calibrations(view.scene, sensors, view.streams)
+            timeline = Timeline(begun, self.assets, self._category_ids)
             time_s = step_index * self.info.step_s
             scene = timeline.at(time_s)
             streams = replace(view.streams, step=step_index)

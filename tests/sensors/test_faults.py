@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 from gen_data.core.capture import Channel, LidarHits, Measurements, PointCloud, SensorReading
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.reported import reported
 from gen_data.core.scene import Camera, Device, Lidar, Scene
-from gen_data.core.se3 import SE3
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.serialization import canonical_json
 from gen_data.core.streams import Streams
 from gen_data.runner.labels import labels_line, parse_labels
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_faults import LidarFaults
 from gen_data.sensors.navigation import gnss, imu
 from gen_data.sensors.navigation.navigation_faults import GnssFaults, ImuFaults
-from gen_data.sensors.sensor_faults import Clock
+from gen_data.sensors.sensor_faults import Clock, deliver, with_calibrations
 
 W, H = 64, 48
 CAMERA = Camera("color", SE3(), Intrinsics(W, H, 50.0, 50.0, W / 2, H / 2), ev100=5.0)
@@ -230,6 +232,47 @@ def test_stamps_of_one_reading_keep_their_order_and_equal_instants_stay_equal() 
     stamps_s = clock(jitter_s=0.01).stamp(readings, stream()).rows["time_s"]
     assert (np.diff(stamps_s) >= 0.0).all()
     assert (stamps_s[::2] == stamps_s[1::2]).all()
+
+
+def calibrated(fields: str, view: int = 0) -> Scene:
+    camera = RgbCamera.model_validate_json('{"faults": {"extrinsics": {' + fields + "}}}")
+    pose = look_at((1.0, 2.0, 3.0), (4.0, 4.0, 2.0))
+    scene = replace(SCENE, cameras=(replace(CAMERA, T_world_camera=pose),))
+    return with_calibrations(scene, [camera], Streams(seed=5, scene=0, view=view))
+
+
+def test_stated_poses_are_off_by_the_angle_and_the_distance_in_any_direction() -> None:
+    """The angle of a rotation from its trace: 1 + 2 cos."""
+    axes = []
+    for view in range(60):
+        (camera,) = calibrated('"rotation_deg": 1.5, "translation_m": 0.08', view).cameras
+        error = camera.T_world_camera.inverse() @ reported(camera).T_world_camera
+        turn = error.rotation()
+        assert math.acos(0.5 * (np.trace(turn) - 1.0)) == pytest.approx(math.radians(1.5), rel=1e-4)
+        assert math.hypot(*error.translation_m) == pytest.approx(0.08, abs=3e-6)
+        axes.append(np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0]]))
+        axes[-1] = np.append(axes[-1] / (2.0 * math.sin(math.radians(1.5))), error.translation_m[0])
+    # Components of directions that are even on a sphere have a variance of a third.
+    assert np.abs(np.mean(axes, axis=0) / (1.0, 1.0, 0.08)).max() < 4 * math.sqrt(1 / 3 / 60)
+
+
+def test_errors_of_calibrations_of_size_0_leave_the_scene_and_its_bytes() -> None:
+    plain = canonical_json(calibrated(""))
+    assert "T_sensor_reported" not in plain
+    assert canonical_json(calibrated('"rotation_deg": 0, "translation_m": 0.0')) == plain
+    # A scene that is rendered again without the fault loses the error.
+    wrong = calibrated('"rotation_deg": 1')
+    assert canonical_json(with_calibrations(wrong, [RgbCamera()], Streams(5, 0, 0))) == plain
+
+
+def test_readings_record_the_error_of_the_calibration() -> None:
+    camera = RgbCamera.model_validate_json('{"faults": {"extrinsics": {"rotation_deg": 2}}}')
+    (placed,) = calibrated('"rotation_deg": 2').cameras
+    found = deliver(camera, replace(CLEAN, camera=placed), stream()).faults["extrinsics"]
+    assert found["rotation_deg"] == pytest.approx(2.0, abs=1e-6)
+    assert found["translation_m"] == 0.0
+    stated = placed.T_world_camera.matrix() @ found["T_sensor_reported"]
+    assert stated == pytest.approx(reported(placed).T_world_camera.matrix(), abs=2e-6)
 
 
 def test_labels_hold_the_truth_about_faults_and_are_as_before_without() -> None:
