@@ -20,7 +20,8 @@ topic                           message (Protobuf schema ``foxglove.*``)
 Every sequence starts at 0:00 UTC of 1 January 2020. Log times and times in messages are equal: each
 sensor has the instant of its reading, a scanner the middle of its sweep. ``time_s`` of points
 counts from there: stamp plus time is the instant of the pulse, or from the start of the
-sweep (``point_time``). Messages are in order of time. Frames are called
+sweep (``point_time``). With a wrong clock, messages of a sensor have the reported time, and the
+transforms of that time are the true ones then. Messages are in order of time. Frames are called
 ``camera/<name>`` (X right, Y down, Z forward), ``lidar/<name>`` and ``rig/<name>`` (X forward,
 Y left, Z up).
 
@@ -45,8 +46,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from gen_data.core import capture, errors, intrinsics, se3, serialization
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import reported, reported_s
 from gen_data.core.sample import ImageTruth, Sample
 from gen_data.core.scene import Camera, Instance, Lidar
+from gen_data.core.scene_time import scene_at
 from gen_data.exporters import base, fragments
 from gen_data.exporters.conventions import POINT_TIME, Conventions
 from gen_data.exporters.point_cloud_io import PointTime, count_times_from, read_points
@@ -134,13 +137,19 @@ class Mcap(base.ExporterBase):
 def _frame_row(sample: Sample) -> dict[str, Any]:
     """Times, poses, calibrations and boxes of a sample."""
     readings, clouds = sample.capture.readings, sample.capture.clouds
-    cameras = {name: readings[name].time_s for name in sorted(sample.truth)}
-    transforms: list[tuple[float, str, str, se3.SE3]] = []
-    for name, time_s in cameras.items():
-        transforms += _camera_transforms(sample.truth[name].camera, time_s)
-    for cloud in clouds.values():
-        transforms += _lidar_transforms(cloud.lidar, cloud.time_s)
     scene = sample.scene
+    cameras = {name: reported_s(readings[name]) for name in sorted(sample.truth)}
+    transforms: list[tuple[float, str, str, se3.SE3]] = []
+    for name, stamp_s in cameras.items():
+        camera = sample.truth[name].camera
+        camera = (
+            camera if stamp_s == readings[name].time_s else scene_at(scene, stamp_s).camera(name)
+        )
+        transforms += _camera_transforms(camera, stamp_s)
+    for name, cloud in clouds.items():
+        stamp_s, lidar = reported_s(cloud), cloud.lidar
+        lidar = lidar if stamp_s == cloud.time_s else scene_at(scene, stamp_s).lidar(name)
+        transforms += _lidar_transforms(lidar, stamp_s)
     transforms += [
         (scene.time_s, WORLD, f"rig/{rig.name}", scene.rig_pose(rig.name)) for rig in scene.rigs
     ]
@@ -152,9 +161,10 @@ def _frame_row(sample: Sample) -> dict[str, Any]:
             [time_ns, parent, child, *_pose_numbers(pose)]
             for (time_ns, child), (parent, pose) in sorted(unique.items(), key=_by_time_and_frame)
         ],
-        "cameras": {n: _camera_row(sample.truth[n], time_s) for n, time_s in cameras.items()},
+        "cameras": {n: _camera_row(sample.truth[n], stamp_s) for n, stamp_s in cameras.items()},
         "lidars": {
-            name: [_ns(cloud.time_s), cloud.lidar.sweep_s] for name, cloud in sorted(clouds.items())
+            name: [_ns(reported_s(cloud)), cloud.lidar.sweep_s]
+            for name, cloud in sorted(clouds.items())
         },
         "objects": [_object_row(thing, box) for thing, box in world_boxes(sample)],
     }
@@ -167,18 +177,18 @@ def _by_time_and_frame(item: tuple[tuple[int, str], Any]) -> tuple[int, str]:
 def _camera_transforms(camera: Camera, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:
     frame = f"camera/{camera.name}"
     if not camera.rig:
-        return [(time_s, WORLD, frame, camera.T_world_camera)]
+        return [(time_s, WORLD, frame, reported(camera).T_world_camera)]
     rig, T_rig_camera = f"rig/{camera.rig}", camera.T_rig_camera
     T_world_rig = camera.T_world_camera @ T_rig_camera.inverse()
-    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, T_rig_camera)]
+    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, reported(camera).T_rig_camera)]
 
 
 def _lidar_transforms(lidar: Lidar, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:
     frame = f"lidar/{lidar.name}"
     if not lidar.rig:
-        return [(time_s, WORLD, frame, lidar.T_world_lidar)]
+        return [(time_s, WORLD, frame, reported(lidar).T_world_lidar)]
     rig, T_world_rig = f"rig/{lidar.rig}", lidar.T_world_lidar @ lidar.T_rig_lidar.inverse()
-    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, lidar.T_rig_lidar)]
+    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, reported(lidar).T_rig_lidar)]
 
 
 def world_boxes(sample: Sample) -> list[tuple[Instance, OrientedBox]]:

@@ -118,7 +118,10 @@ def _path(info: DatasetInfo, sample: Sample, sensor: str) -> str:
 def frame(sample: Sample, sensor: str, lines: Iterable[LaneLine]) -> dict[str, Any]:
     """Content of the file of a photograph, without ``file_path``."""
     scene, camera = sample.scene_of(sensor), sample.truth[sensor].camera
-    T_vehicle_camera = vehicle_pose(scene, camera).inverse() @ RIG_AXES
+    T_vehicle_camera = vehicle_pose(scene, camera).inverse()
+    if camera.T_sensor_reported is not None:
+        T_vehicle_camera = T_vehicle_camera @ camera.T_sensor_reported
+    T_vehicle_camera = T_vehicle_camera @ RIG_AXES
     T_camera_level = (level_pose(scene, camera) @ RIG_AXES).inverse()
     return {
         "intrinsic": intrinsic_rows(camera.intrinsics),

@@ -32,6 +32,7 @@ from pydantic import Field
 
 from gen_data.core.capture import Channel, ImageEncoding
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import reported
 from gen_data.core.sample import TRACK_STATES, Sample, SensorTracks
 from gen_data.core.scene import Camera
 from gen_data.exporters import base, image_files, sensor_selection
@@ -109,7 +110,7 @@ class TapVid(base.ExporterBase):
             "image_px": np.nan_to_num(tracks.image_px, nan=0.0),
             "visible": seen,
             "K": np.array([k.fx_px, k.fy_px, k.cx_px, k.cy_px]),
-            "T_camera_world": camera.T_world_camera.inverse().matrix(),
+            "T_camera_world": reported(camera).T_world_camera.inverse().matrix(),
         }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:

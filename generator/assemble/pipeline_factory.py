@@ -27,6 +27,7 @@ from gen_data.randomizers.base import RandomizerBase
 from gen_data.scene_templates.builder import build_scene
 from gen_data.sensors.camera.plate_camera import PlateCamera
 from gen_data.sensors.mounting import check_not_buried, stride, within_steps
+from gen_data.sensors.sensor_faults import faults_of
 
 NOMINAL_SCENES_KEPT = 32
 
@@ -226,13 +227,17 @@ def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> interfa
         n=n,
         views_per_scene=config.general.samples_per_scene // config.general.steps_per_scene,
         categories=categories,
-        sensors=tuple(sorted((s.describe() for s in config.sensors), key=lambda s: s.name)),
+        sensors=tuple(sorted(map(_described, config.sensors), key=lambda s: s.name)),
         depth_scale_m=config.general.depth_scale_m,
         steps_per_scene=config.general.steps_per_scene,
         step_s=config.general.step_s,
         publication=interfaces.Publication(**config.general.dataset.model_dump()),
         twins=config.general.twins,
     )
+
+
+def _described(sensor: interfaces.Sensor) -> interfaces.SensorInfo:
+    return replace(sensor.describe(), faults=faults_of(sensor).kinds)
 
 
 def _check_durations(config: Config) -> None:

@@ -24,7 +24,7 @@ compute ids instead of counting.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
@@ -32,7 +32,15 @@ from typing import Any, Literal, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
-from gen_data.core import asset_types, errors, measurement_dtypes, plates, se3, streams
+from gen_data.core import (
+    asset_types,
+    errors,
+    measurement_dtypes,
+    plates,
+    se3,
+    serialization,
+    streams,
+)
 from gen_data.core.capture import (
     PNG,
     Capture,
@@ -379,6 +387,7 @@ class SensorInfo:
         motion_distortion: Laser scanners: the frame of points: ``raw``, that of each pulse's own
             instant; ``deskewed``, that of the sweep's middle; ``none``, all pulses leave then.
         needs_clear_view: Whether a position inside the body that carries it is refused.
+        faults: Kinds of errors in what it reports: ``clock``, ``extrinsics``.
     """
 
     name: str
@@ -394,6 +403,7 @@ class SensorInfo:
     rgb_encoding: ImageEncoding = PNG
     origins: bool = False
     motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
+    faults: tuple[str, ...] = field(default=(), metadata={serialization.SPARSE: True})
 
 
 class Sensor(Protocol):

@@ -150,10 +150,7 @@ class Recorder:
 
     def _record_faults(self, capture: Capture) -> None:
         """Log the true faults of all readings that have some, as text."""
-        faults = {name: reading.faults for name, reading in capture.readings.items()}
-        faults |= {name: cloud.faults for name, cloud in capture.clouds.items()}
-        faults |= {name: table.faults for name, table in capture.tables.items()}
-        for name, found in sorted(faults.items()):
+        for name, found in capture.faults():
             if found:
                 text = serialization.canonical_json(found)
                 self.stream.log(f"faults/{name}", rr.TextDocument(text))
