@@ -38,7 +38,7 @@ from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import SE3
-from gen_data.exporters import base, image_files
+from gen_data.exporters import base, image_files, nuscenes_classes
 from gen_data.exporters.argoverse_map import argoverse_map
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.nuscenes_frames import annotated_things, rig_pose_at
@@ -118,8 +118,8 @@ class Argoverse2(base.AssetExporter):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: there is no laser scanner, a camera is not a pinhole, or a package is
-                missing.
+            ConfigError: there is no laser scanner, a camera is not a pinhole, no category has a
+                class in this format, or a package is missing.
         """
         base.check_installed(self.type, "pyarrow", "shapely")
         if not laser_scanner(info, self.lidar, self.type):
@@ -128,6 +128,9 @@ class Argoverse2(base.AssetExporter):
                 "{type: lidar, name: up_lidar, model: VLP-32C}"
             )
         check_pinholes(info, rgb_cameras(info), self.type)
+        things = nuscenes_classes.classes().things.items()
+        known = [ours for ours, theirs in things if theirs in CLASSES and "/" not in ours]
+        base.check_classes(self.type, info, known)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write scans and maps, and a line per sample.

@@ -1,6 +1,6 @@
 """Base class of exporters, with defaults for the optional members of ``Exporter``."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from fnmatch import fnmatchcase
 from typing import ClassVar, TypeVar, get_args
 
@@ -118,6 +118,28 @@ class AssetExporter(ExporterBase):
         """The library of ``with_assets``."""
         assert self._assets is not None, "call with_assets first"
         return self._assets
+
+
+def check_classes(exporter: str, info: interfaces.DatasetInfo, known: Collection[str]) -> None:
+    """Reject a data set without a single object that a format has a class for.
+
+    Args:
+        exporter: Its name.
+        info: Facts about the data set.
+        known: Categories with a class; case and underscores do not count.
+
+    Raises:
+        ConfigError: the text names them.
+    """
+    if not {*map(_plain, known)} & {*map(_plain, info.categories)}:
+        raise errors.ConfigError(
+            f"exporter '{exporter}': no category of the data set has a class in this format; "
+            f"expected at least one of: {', '.join(known)}. Use coco for other categories"
+        )
+
+
+def _plain(category: str) -> str:
+    return category.lower().replace("_", " ")
 
 
 def check_image_formats(exporter: interfaces.Exporter, info: interfaces.DatasetInfo) -> None:

@@ -90,8 +90,9 @@ class Cityscapes(base.AssetExporter):
 
         Raises:
             ConfigError: the camera is missing, is not a pinhole or lacks a channel, or there are
-                too many samples.
+                too many samples or no classes.
         """
+        base.check_classes(self.type, info, city_classes().categories)
         camera = pinhole_camera(info, self.camera, self.type)
         needed = [Channel.INSTANCE, *([Channel.DISPARITY] if self.right else [])]
         require_channels(info, camera, needed, self.type)

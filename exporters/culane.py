@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
 from gen_data.exporters import base, fragments, image_files
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.lane_lines import (
@@ -41,6 +42,7 @@ from gen_data.exporters.lane_lines import (
     lane_lines,
 )
 from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.road_map import check_street
 from gen_data.exporters.sensor_selection import check_channels, photographs
 from gen_data.exporters.sequences import (
     FRAMES,
@@ -74,6 +76,14 @@ class CULane(base.AssetExporter):
         """
         check_channels(info, (), self.type)
         base.check_installed(self.type, "shapely")
+
+    def check_scene(self, scene: Scene) -> None:
+        """Reject scenes without a street.
+
+        Raises:
+            ConfigError: the text names the missing element.
+        """
+        check_street(scene, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write text and mask of each photograph."""

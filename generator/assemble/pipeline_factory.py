@@ -108,7 +108,10 @@ class PipelineFactory:
         for probe, scene in zip(config.probes, self.nominal, strict=True):
             with refused.collected():
                 check_scene(config, scene)
-            for error in preflight.unrectified_pairs(probe, scene, self.library):
+            for error in (
+                *preflight.unrectified_pairs(probe, scene, self.library),
+                *preflight.tiny_fiducials(probe, scene, self.library),
+            ):
                 with refused.collected(), located_errors(config.document):
                     raise error
         refused.raise_if_any()

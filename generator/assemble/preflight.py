@@ -8,10 +8,15 @@ import numpy as np
 from gen_data.assemble.config import SceneConfig
 from gen_data.core import errors, interfaces, scene_time, stereo, streams
 from gen_data.core.scene import Camera, Region, Scene
+from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.randomizers.rig_calibration import RigCalibration
 from gen_data.randomizers.room_path import RoomPath
 from gen_data.scene_templates.carrier import Carrier
 
+FIDUCIAL = "fiducial"
+"""Tag of markers and calibration boards."""
+LENS_CHANGE = 2.0
+"""Largest factor by which randomizers are assumed to lengthen a lens."""
 PAIR_REMEDY = (
     "mount them on one rig with the same size, field of view, lens and angles, the right one "
     "beside the left, and vary neither alone by a randomizer"
@@ -57,6 +62,50 @@ def _fault_of_pair(left: Camera, right: Camera) -> str:
     except ValueError as error:
         return str(error)
     return ""
+
+
+def tiny_fiducials(
+    config: SceneConfig, scene: Scene, assets: interfaces.AssetIndex
+) -> Iterator[errors.ConfigError]:
+    """Markers and boards that are smaller than a pixel in every image, as with a wrong unit.
+
+    Only where all cameras are placed at stated distances from the scene's focus: then no draw
+    brings a marker nearer. ``LENS_CHANGE`` allows for lenses that vary.
+    """
+    orbits = [r for r in config.randomizers if isinstance(r, CameraPose)]
+    if not orbits or any(r.fills or r.rig or r.aim.outcomes() != ("",) for r in orbits):
+        return
+    if any(camera.rig or not _placed_by(camera, orbits) for camera in scene.cameras):
+        return
+    focus = np.array(scene.focus.center_m)
+    for body in scene.bodies:
+        if FIDUCIAL not in assets.get(body.asset).tags:
+            continue
+        low, high = np.array(assets.bounds_m(body.asset)) * body.scale
+        size_m, away_m = (
+            np.linalg.norm(high - low),
+            np.linalg.norm(high)
+            + np.linalg.norm(np.array(body.T_world_body.translation_m) - focus),
+        )
+        widths = []
+        for camera in scene.cameras:
+            near_m = min(
+                r.distance_m.support()[0] - math.sqrt(3) * r.jitter_m.support()[1]
+                for r in _placed_by(camera, orbits)
+            )
+            lens = camera.intrinsics
+            sharp_px = LENS_CHANGE * max(lens.fx_px, lens.fy_px)
+            widths.append(sharp_px * size_m / max(near_m - away_m, 1e-3))
+        if max(widths, default=math.inf) < 1.0:
+            yield errors.ConfigError(
+                f"elements.{body.name}.asset: '{body.asset}' is {max(widths):.2g} px long at most "
+                "in all images; expected at least one pixel: a larger one, more pixels "
+                "(size_px), or a camera that comes nearer (distance_m)"
+            )
+
+
+def _placed_by(camera: Camera, orbits: Iterable[CameraPose]) -> list[CameraPose]:
+    return [orbit for orbit in orbits if orbit.camera in ("", camera.name)]
 
 
 def far_sensors(config: SceneConfig, scene: Scene) -> Iterator[str]:
