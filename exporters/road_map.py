@@ -24,8 +24,6 @@ HOLE_M2 = 1.0
 """Smaller holes are covers of manholes and drains, over which vehicles drive."""
 CRUMB_M2 = 0.01
 """Smaller pieces of areas are rounding."""
-LARGE_M2 = 1.0
-"""Smaller pieces are mostly patches and traces on larger ones, which need not be joined."""
 DECIMALS = 4
 """Corners of meshes are rounded to tenths of millimetres: pieces that meet have no cracks."""
 BESIDE_M, ACROSS_M = 0.45, 0.4
@@ -173,7 +171,8 @@ def road_map(scene: Scene, assets: AssetLibrary) -> RoadMap:
     """Derive the map of a world from its lanes, meshes and signals."""
     lanes = tuple(lane for lane in scene.lanes if len(lane.center_m) > 1)
     bodies = [_level(body) for body in ground_bodies(scene)]
-    plans = {body.name: _union(surface(body, assets, PAVED)[0]) for body in bodies}
+    paved = {body.name: surface(body, assets, PAVED)[0] for body in bodies}
+    plans = {name: _union(triangles) for name, triangles in paved.items() if len(triangles)}
     paint = _paint(bodies, assets)
     driving = [lane for lane in lanes if lane.kind == "driving"]
     segments = tuple(_segments(driving, plans))
@@ -229,7 +228,8 @@ class PaintIndex:
         import shapely
 
         path = shapely.LineString(line)
-        near = np.sort(self._tree.query(path, predicate="dwithin", distance=BESIDE_M))
+        steps = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
+        near = np.unique(self._tree.query(steps, predicate="dwithin", distance=BESIDE_M)[1])
         corners = self.triangles[near]
         at_m = shapely.line_locate_point(path, shapely.points(line))
         if not len(near):
@@ -294,14 +294,38 @@ def _level(body: Body) -> Body:
 
 
 def _union(triangles: Array) -> Geometry:
+    """Area of upward triangles [n, 3, 3], which may overlap.
+
+    Sides of two triangles cancel: the other ones part the plane into few faces, and how often they
+    wind around a face is the number of triangles on it.
+    """
     import shapely
 
-    pieces = shapely.polygons(triangles[..., :2].round(DECIMALS))
-    large = shapely.area(pieces) > LARGE_M2
-    base = shapely.union_all(pieces[large])
-    shapely.prepare(base)
-    small = pieces[~large]
-    return _tidy(shapely.union_all([base, *small[~shapely.covers(base, small)]]))
+    corners = np.rint(triangles[..., :2] * 10.0**DECIMALS).astype(np.int64)
+    keys = (corners[..., 0] << 32) + corners[..., 1]
+    side = np.stack([keys, np.roll(keys, -1, axis=1)], axis=-1).reshape(-1, 2)
+    low, high = side.min(axis=1), side.max(axis=1)
+    order = np.lexsort((high, low))
+    changes = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
+    first = np.flatnonzero(np.concatenate([[True], changes]))
+    times = np.add.reduceat(np.sign(side[:, 1] - side[:, 0])[order], first)
+    rows, times = order[first][times != 0], times[times != 0]
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-2).reshape(-1, 2, 2)[rows]
+    ends = np.where((side[rows, 0] < side[rows, 1])[:, None, None], ends, ends[:, ::-1])
+    lines = ends / 10.0**DECIMALS
+    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(shapely.linestrings(lines))]))
+    inside = shapely.get_coordinates(shapely.point_on_surface(faces))
+    return _tidy(shapely.coverage_union_all(faces[_winding(lines, times, inside) > 0]))
+
+
+def _winding(lines: Array, times: NDArray[np.int64], points: Array) -> NDArray[np.int64]:
+    """How often lines [n, 2, 2], each counted some times [n], wind around points [k, 2]; [k]."""
+    (x0, y0), (x1, y1) = lines[:, 0].T, lines[:, 1].T
+    x, y = points.T[..., None]
+    left = (x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)
+    upward = (y0 <= y) & (y < y1) & (left > 0.0)
+    downward = (y1 <= y) & (y < y0) & (left < 0.0)
+    return np.asarray((upward.astype(np.int64) - downward) @ times)
 
 
 def _join(areas: Iterable[Geometry]) -> Geometry:

@@ -132,7 +132,7 @@ def border_line(lane: Lane, side: Side) -> tuple[Vec3, ...]:
     half_m = 0.5 * lane.width_m * sign
     points = center + half_m * left_normals(center)
     points[:, 2] += half_m * np.asarray(lane.banks or lane.bank)
-    return tuple((float(x), float(y), float(z)) for x, y, z in np.round(points, 6) + 0.0)
+    return tuple((x, y, z) for x, y, z in (np.round(points, 6) + 0.0).tolist())
 
 
 def left_normals(line_m: Array) -> Array:
