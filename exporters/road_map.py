@@ -105,6 +105,14 @@ class Paint:
     is_yellow: bool = False
 
 
+PAINTS = tuple(
+    Paint(style, double, yellow)
+    for style in ("none", "dashed", "solid")
+    for double in (False, True)
+    for yellow in (False, True)
+)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Divider:
     """Border of driving lanes, and its paint at each of its points."""
@@ -170,10 +178,8 @@ class RoadMap:
 def road_map(scene: Scene, assets: AssetLibrary) -> RoadMap:
     """Derive the map of a world from its lanes, meshes and signals."""
     lanes = tuple(lane for lane in scene.lanes if len(lane.center_m) > 1)
-    bodies = [_level(body) for body in ground_bodies(scene)]
-    paved = {body.name: surface(body, assets, PAVED)[0] for body in bodies}
-    plans = {name: _union(triangles) for name, triangles in paved.items() if len(triangles)}
-    paint = _paint(bodies, assets)
+    plans = _plans(scene, assets)
+    paint = find_paint(scene, assets)
     driving = [lane for lane in lanes if lane.kind == "driving"]
     segments = tuple(_segments(driving, plans))
     blocks = tuple(_blocks(driving, segments))
@@ -189,9 +195,16 @@ def road_map(scene: Scene, assets: AssetLibrary) -> RoadMap:
     )
 
 
+def drivable_areas(scene: Scene, assets: AssetLibrary) -> tuple[Area, ...]:
+    """``RoadMap.drivable`` alone."""
+    return tuple(_areas(_join(_plans(scene, assets).values())))
+
+
 def find_paint(scene: Scene, assets: AssetLibrary) -> "PaintIndex":
     """All paint of a street."""
-    return _paint([_level(body) for body in ground_bodies(scene)], assets)
+    marks = [surface(body, assets, PAINT) for body in _level_bodies(scene)]
+    triangles = np.concatenate([np.zeros((0, 3, 2)), *(found[0][..., :2] for found in marks)])
+    return PaintIndex(triangles, np.concatenate([np.zeros(0, np.bool_), *(m[1] for m in marks)]))
 
 
 def lane_area(lanes: Sequence[Lane]) -> Area:
@@ -230,10 +243,10 @@ class PaintIndex:
         path = shapely.LineString(line)
         steps = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
         near = np.unique(self._tree.query(steps, predicate="dwithin", distance=BESIDE_M)[1])
+        if not len(near):
+            return (PAINTS[0],) * len(line)
         corners = self.triangles[near]
         at_m = shapely.line_locate_point(path, shapely.points(line))
-        if not len(near):
-            return (Paint(),) * len(line)
         along_m = shapely.line_locate_point(path, shapely.points(corners))
         middle_m = np.clip(along_m.mean(axis=1), 0.05, path.length - 0.05)
         before, after = (
@@ -259,14 +272,8 @@ class PaintIndex:
             for flags in (some, some & left & right, some & tinted)
         )
         share = painted / np.maximum(high - low, 1)
-        return tuple(
-            Paint()
-            if part < DASHED
-            else Paint("solid" if part >= SOLID else "dashed", 2 * two > count, 2 * dyed > count)
-            for part, count, two, dyed in zip(
-                share.tolist(), painted.tolist(), double.tolist(), tint.tolist(), strict=True
-            )
-        )
+        kinds = 4 + 4 * (share >= SOLID) + 2 * (2 * double > painted) + (2 * tint > painted)
+        return tuple(PAINTS[kind] for kind in np.where(share < DASHED, 0, kinds).tolist())
 
 
 def _covered(
@@ -275,22 +282,24 @@ def _covered(
     """Which stations are within any chosen span."""
     first = np.searchsorted(stations, spans[0][chosen])
     last = np.searchsorted(stations, spans[1][chosen], "right")
-    steps = np.zeros(len(stations) + 1, np.int64)
-    np.add.at(steps, first, 1)
-    np.add.at(steps, last, -1)
+    count = len(stations) + 1
+    steps = np.bincount(first, minlength=count) - np.bincount(last, minlength=count)
     return np.asarray(np.cumsum(steps)[:-1] > 0)
 
 
-def _paint(bodies: Iterable[Body], assets: AssetLibrary) -> PaintIndex:
-    marks = [surface(body, assets, PAINT) for body in bodies]
-    triangles = np.concatenate([np.zeros((0, 3, 2)), *(found[0][..., :2] for found in marks)])
-    return PaintIndex(triangles, np.concatenate([np.zeros(0, np.bool_), *(m[1] for m in marks)]))
+def _level_bodies(scene: Scene) -> list[Body]:
+    """Bodies of the ground, on level ground: meshes have fewer triangles, and the same plan."""
+    bodies = []
+    for body in ground_bodies(scene):
+        found = split_draped(parse_asset_id(body.asset)) if "relief=" in body.asset else None
+        bodies.append(body if found is None else replace(body, asset=str(found[0])))
+    return bodies
 
 
-def _level(body: Body) -> Body:
-    """A body on level ground: its mesh has fewer triangles, and the same plan."""
-    found = split_draped(parse_asset_id(body.asset)) if "relief=" in body.asset else None
-    return body if found is None else replace(body, asset=str(found[0]))
+def _plans(scene: Scene, assets: AssetLibrary) -> dict[str, Geometry]:
+    """Carriageways by name of the body."""
+    paved = {body.name: surface(body, assets, PAVED)[0] for body in _level_bodies(scene)}
+    return {name: _union(triangles) for name, triangles in paved.items() if len(triangles)}
 
 
 def _union(triangles: Array) -> Geometry:
