@@ -39,7 +39,7 @@ from gen_data.core.scene import Lane, Scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.exporters import base, fragments
 from gen_data.exporters.conventions import SAMPLE, Conventions
-from gen_data.exporters.road_map import Geometry, check_street, drivable_areas, lane_area
+from gen_data.exporters.road_map import Geometry, StreetExporter, drivable_areas, lane_area
 from gen_data.exporters.sequences import write_json, write_text
 
 CLASSES = ("divider", "ped_crossing", "boundary")
@@ -51,7 +51,7 @@ SHORT_M = 0.05
 """Shorter pieces of lines are left out."""
 
 
-class MapVectors(base.AssetExporter):
+class MapVectors(StreetExporter):
     """Dividers, crosswalks, boundaries and centre lines around the ego, for MapTR and alike."""
 
     type: Literal["map_vectors"] = "map_vectors"
@@ -64,22 +64,13 @@ class MapVectors(base.AssetExporter):
     axes: Literal["ego", "lidar"] = Field("ego")
     """Axes of the vectors: X forward, Y left, or X right, Y forward."""
 
-    def check(self, info: DatasetInfo) -> None:
-        """Reject a system without Shapely.
-
-        Raises:
-            ConfigError: Shapely is missing.
-        """
-        del info
-        base.check_installed(self.type, "shapely")
-
     def check_scene(self, scene: Scene) -> None:
         """Reject scenes without a street or a rig.
 
         Raises:
             ConfigError: the text names the missing element.
         """
-        check_street(scene, self.type)
+        super().check_scene(scene)
         self._ego(scene)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from gen_data.assets.asset_ids import parse_asset_id
 from gen_data.assets.drape import split_draped
 from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.core.lane_geometry import LaneBorder, border_line, lane_borders
 from gen_data.core.scene import Body, Lane, Scene
 from gen_data.core.se3 import Array, Vec3
+from gen_data.exporters import base
 from gen_data.roads.carriageway import PAINT, PAVED, ground_bodies, surface
 
 HOLE_M2 = 1.0
@@ -49,12 +50,28 @@ Geometry = Any
 """Of Shapely, which has no types."""
 
 
-def check_street(scene: Scene, exporter: str) -> None:
-    """Raise ConfigError if a scene has no driving lane."""
-    if not any(lane.kind == "driving" for lane in scene.lanes):
-        raise ConfigError(
-            f"exporter '{exporter}': the scene has no driving lane; add an element 'road'"
-        )
+class StreetExporter(base.AssetExporter):
+    """An exporter of maps, which scenes without a street do not have."""
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a system without Shapely.
+
+        Raises:
+            ConfigError: Shapely is missing.
+        """
+        del info
+        base.check_installed(self.type, "shapely")
+
+    def check_scene(self, scene: Scene) -> None:
+        """Reject scenes without a street.
+
+        Raises:
+            ConfigError: the text names the missing element.
+        """
+        if not any(lane.kind == "driving" for lane in scene.lanes):
+            raise ConfigError(
+                f"exporter '{self.type}': the scene has no driving lane; add an element 'road'"
+            )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -299,11 +316,11 @@ def _level_bodies(scene: Scene) -> list[Body]:
 def _plans(scene: Scene, assets: AssetLibrary) -> dict[str, Geometry]:
     """Carriageways by name of the body."""
     paved = {body.name: surface(body, assets, PAVED)[0] for body in _level_bodies(scene)}
-    return {name: _union(triangles) for name, triangles in paved.items() if len(triangles)}
+    return {name: plan_area(triangles) for name, triangles in paved.items() if len(triangles)}
 
 
-def _union(triangles: Array) -> Geometry:
-    """Area of upward triangles [n, 3, 3], which may overlap.
+def plan_area(triangles: Array) -> Geometry:
+    """Area of upward triangles [n, 3, 3] in plan; they may overlap. Small holes are filled.
 
     Sides of two triangles cancel: the other ones part the plane into few faces, and how often they
     wind around a face is the number of triangles on it.
