@@ -53,6 +53,8 @@ Geometry = Any
 class StreetExporter(base.AssetExporter):
     """An exporter of maps, which scenes without a street do not have."""
 
+    type: str
+
     def check(self, info: DatasetInfo) -> None:
         """Reject a system without Shapely.
 
