@@ -437,10 +437,7 @@ def _borders(borders: Sequence[BorderTruth], bent: Rectification) -> tuple[Borde
     cut = []
     for border in borders:
         places = bent.points(np.array(border.points_px))
-        for start, end in lanes.runs(bent.shows(places)):
-            if end - start >= 2:
-                points = tuple(
-                    (round(float(u), 2), round(float(v), 2)) for u, v in places[start:end]
-                )
-                cut.append(replace(border, points_px=points, visible=border.visible[start:end]))
+        for start, end in lanes.runs(np.flatnonzero(bent.shows(places))):
+            points = tuple((round(float(u), 2), round(float(v), 2)) for u, v in places[start:end])
+            cut.append(replace(border, points_px=points, visible=border.visible[start:end]))
     return tuple(cut)
