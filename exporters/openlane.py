@@ -35,7 +35,6 @@ import numpy as np
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.core.scene import Scene
 from gen_data.core.scene_time import RIG_AXES
 from gen_data.core.se3 import Array
 from gen_data.exporters import base, fragments, image_files
@@ -48,7 +47,7 @@ from gen_data.exporters.lane_lines import (
     vehicle_pose,
 )
 from gen_data.exporters.nuscenes_frames import intrinsic_rows
-from gen_data.exporters.road_map import check_street
+from gen_data.exporters.road_map import StreetExporter
 from gen_data.exporters.sensor_selection import check_pinholes, photographs, rgb_cameras
 from gen_data.exporters.sequences import (
     FRAMES,
@@ -66,7 +65,7 @@ ATTRIBUTES = {-2: 1, -1: 2, 1: 3, 2: 4}
 DECIMALS = 4
 
 
-class OpenLane(base.AssetExporter):
+class OpenLane(StreetExporter):
     """OpenLane 1.x: lines of lanes in space and in images, with visibility of every point."""
 
     type: Literal["openlane"] = "openlane"
@@ -82,15 +81,7 @@ class OpenLane(base.AssetExporter):
             ConfigError: there is no photograph, a camera is not a pinhole, or Shapely is missing.
         """
         check_pinholes(info, rgb_cameras(info), self.type)
-        base.check_installed(self.type, "shapely")
-
-    def check_scene(self, scene: Scene) -> None:
-        """Reject scenes without a street.
-
-        Raises:
-            ConfigError: the text names the missing element.
-        """
-        check_street(scene, self.type)
+        super().check(info)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a file per photograph."""
