@@ -56,6 +56,7 @@ class Rerun(base.ExporterBase):
     """
 
     type: Literal["rerun"] = "rerun"
+    shows_truth: ClassVar[bool] = True
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i + 0.5",
         box="left, top, right, bottom along the edges of pixels",

@@ -18,11 +18,12 @@ from gen_data.core import interfaces, path_names, plates
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError, ConfigWarning, Refusals, UnknownAsset
 from gen_data.core.scene import LABEL_IDS_MAX, Scene, SharedValue
-from gen_data.exporters.base import ExporterBase, check_image_formats
+from gen_data.exporters.base import ExporterBase, check_delivery, check_image_formats
 from gen_data.exporters.label_map import MappedExporter
 from gen_data.packs.provision import open_assets
 from gen_data.physics import missing_engine, open_engine
 from gen_data.pipeline import Pipeline, exporter_views, pipeline
+from gen_data.pipeline.delivered import delivered
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.scene_templates.builder import build_scene
 from gen_data.sensors.camera.plate_camera import PlateCamera
@@ -445,8 +446,9 @@ def ready_exporters(
         with refused.collected(), located_errors(config.document):
             if not isinstance(exporter, exporter_views.ExporterView):
                 check_image_formats(own, info)
+                check_delivery(own, info)
         with refused.collected(), located_errors(config.document):
             exporter.check(info)
-        exporters[exporter.type] = exporter.with_assets(library)
+        exporters[exporter.type] = delivered(own, exporter, info).with_assets(library)
     refused.raise_if_any()
     return exporters

@@ -387,7 +387,8 @@ class SensorInfo:
         motion_distortion: Laser scanners: the frame of points: ``raw``, that of each pulse's own
             instant; ``deskewed``, that of the sweep's middle; ``none``, all pulses leave then.
         needs_clear_view: Whether a position inside the body that carries it is refused.
-        faults: Kinds of errors in what it reports: ``clock``, ``extrinsics``.
+        faults: Kinds of errors in what it reports: ``clock``, ``extrinsics``, ``lost``,
+            ``doubled``.
     """
 
     name: str

@@ -20,6 +20,8 @@ POSES = {
 
 CLOCK = "clock"
 """Key of the record of a clock in ``faults``; see ``sensors.sensor_faults.Clock``."""
+DELIVERY = "delivery"
+"""Key of the record of a reading's delivery; see ``sensors.sensor_faults.Delivery``."""
 
 
 def clock_error_s(reading: SensorReading | PointCloud | Measurements) -> float:
@@ -31,6 +33,17 @@ def clock_error_s(reading: SensorReading | PointCloud | Measurements) -> float:
 def reported_s(reading: SensorReading | PointCloud | Measurements) -> float:
     """Stamp of a reading [s]: ``time_s``, unless the sensor's clock is wrong."""
     return delayed_s(reading.time_s, clock_error_s(reading))
+
+
+def arrived_s(reading: SensorReading | PointCloud | Measurements) -> float:
+    """Instant [s], by a true clock, at which a reading arrives: ``time_s``, unless it is late."""
+    return float(reading.faults.get(DELIVERY, {}).get("arrived_s", reading.time_s))
+
+
+def copies(reading: SensorReading | PointCloud | Measurements) -> int:
+    """How many times a reading arrives, from 0."""
+    record = reading.faults.get(DELIVERY, {})
+    return 0 if record.get("lost") else 2 if record.get("doubled") else 1
 
 
 def delayed_s(time_s: float, error_s: float) -> float:

@@ -1,18 +1,20 @@
-"""Faults that any sensor may have: a wrong clock, and an error of its calibration."""
+"""Faults that any sensor may have: of its clock, its calibration, and its line."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
 from gen_data.config.base_model import Strict
 from gen_data.config.distributions import Bounds, Constant, Scalar
 from gen_data.core.capture import Measurements, PointCloud, SensorReading
 from gen_data.core.interfaces import Sensor
 from gen_data.core.measurement_dtypes import TIME_DECIMALS
-from gen_data.core.reported import CLOCK, Mounted, mounted_of
+from gen_data.core.reported import CLOCK, DELIVERY, Mounted, mounted_of
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import SE3
 from gen_data.core.streams import Rng, Streams
@@ -95,22 +97,92 @@ class Extrinsics(Strict):
         return SE3(tuple((length_m * towards).tolist()), turn).rounded(9)
 
 
+class Delivery(Strict):
+    """Readings that are lost, doubled or late on their way; each is drawn by itself.
+
+    A reading of a device with several ones in a step is the rows of one instant.
+
+    Attributes:
+        lost: Share of readings that do not arrive.
+        doubled: Share of the others that arrive twice.
+        late_s: Time from a reading to its arrival.
+    """
+
+    lost: float = Field(0.0, ge=0, le=1)
+    doubled: float = Field(0.0, ge=0, le=1)
+    late_s: Annotated[Scalar, Bounds(0, 60)] = NONE
+
+    def draw(self, reading: SensorReading | PointCloud | Measurements, rng: Rng) -> "Delivered":
+        """How a reading with true times arrives."""
+        own = rng.streams.rng(f"{rng.name}/faults/delivery")
+        late_s = round(float(self.late_s.draw(own)), TIME_DECIMALS)
+        rows_s = reading.rows["time_s"] if isinstance(reading, Measurements) else np.zeros(0)
+        if not len(rows_s):
+            rows_s = np.array([reading.time_s])
+        times_s, place = np.unique(rows_s, return_inverse=True)
+        shares = own.uniform(size=(2, len(times_s)))
+        lost = shares[0] < self.lost
+        doubled = ~lost & (shares[1] < self.doubled)
+        record: dict[str, Any] = {}
+        for name, drawn in (("lost", lost), ("doubled", doubled)):
+            if drawn.all():
+                record[name] = True
+            elif drawn.any():
+                record[f"{name}_s"] = times_s[drawn].tolist()
+        if late_s and not lost.all():
+            record["arrived_s"] = round(reading.time_s + late_s, TIME_DECIMALS)
+        return Delivered(record, np.where(lost, 0, np.where(doubled, 2, 1))[place.ravel()])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Delivered:
+    """How a reading arrives.
+
+    Attributes:
+        record: ``lost`` and ``doubled``, if the whole reading is; ``lost_s`` and ``doubled_s``,
+            true instants of the rows that are; ``arrived_s``, by a true clock, if it is late.
+        copies: How many times each row of a table arrives, from 0.
+    """
+
+    record: Mapping[str, Any]
+    copies: NDArray[np.int64]
+
+    def of(self, reading: Reading) -> Reading:
+        """The reading with its record, and as many rows as arrive."""
+        if not self.record:
+            return reading
+        faults: dict[str, Any] = {**reading.faults, DELIVERY: self.record}
+        changes: dict[str, Any] = {"faults": faults}
+        if isinstance(reading, Measurements) and len(reading.rows):
+            changes["rows"] = np.repeat(reading.rows, self.copies)
+            true_s = reading.faults.get(CLOCK, {}).get("true_s")
+            if true_s is not None:
+                repeated = np.repeat(np.array(true_s), self.copies).tolist()
+                faults[CLOCK] = {**reading.faults[CLOCK], "true_s": repeated}
+        return replace(reading, **changes)
+
+
 class SensorFaults(Strict):
     """Faults that any sensor may have.
 
     Attributes:
         clock: A wrong clock; null = a true one.
         extrinsics: An error of the stated pose; null = none.
+        delivery: Lost, doubled and late readings; null = none.
     """
 
     clock: Clock | None = None
     extrinsics: Extrinsics | None = None
+    delivery: Delivery | None = None
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Names of the faults of its readings that may be other than 0, for formats."""
         named = {"clock": self.clock, "extrinsics": self.extrinsics}
-        return tuple(name for name, fault in named.items() if fault and _may_differ(fault))
+        kinds = [name for name, fault in named.items() if fault and _may_differ(fault)]
+        if self.delivery is not None:
+            kinds += [name for name in ("lost", "doubled") if getattr(self.delivery, name) > 0.0]
+        return tuple(kinds)
 
 
 def _may_differ(fault: Strict) -> bool:
@@ -144,7 +216,8 @@ def with_calibrations(scene: Scene, sensors: Sequence[Sensor], streams: Streams)
 
 def deliver(sensor: Sensor, reading: Reading, rng: Rng) -> Reading:
     """The reading as a sensor with its ``faults`` reports it; ``rng`` is its stream at the step."""
-    clock, error = faults_of(sensor).clock, mounted_of(reading).T_sensor_reported
+    faults, error = faults_of(sensor), mounted_of(reading).T_sensor_reported
+    arrival = None if faults.delivery is None else faults.delivery.draw(reading, rng)
     if error is not None:
         w, *xyz = error.quaternion_wxyz
         record = {
@@ -154,4 +227,5 @@ def deliver(sensor: Sensor, reading: Reading, rng: Rng) -> Reading:
         }
         changes: dict[str, Any] = {"faults": {**reading.faults, "extrinsics": record}}
         reading = replace(reading, **changes)
-    return reading if clock is None else clock.stamp(reading, rng)
+    reading = reading if faults.clock is None else faults.clock.stamp(reading, rng)
+    return reading if arrival is None else arrival.of(reading)

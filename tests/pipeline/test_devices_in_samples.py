@@ -13,10 +13,12 @@ from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import pipeline_config
 from gen_data.assets.library import open_library
 from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.se3 import SE3
 from gen_data.core.streams import Streams
 from gen_data.pipeline import Pipeline
+from gen_data.pipeline.delivered import DeliveredExporter
 from gen_data.pipeline.pipeline import PipelineConfig
 from gen_data.sensors.events.event_detector import EventDetector
 from gen_data.sensors.mounting import Instrument
@@ -102,7 +104,10 @@ def test_a_wrong_calibration_is_one_through_a_sequence_and_no_reading_differs() 
 
 
 def test_formats_learn_which_faults_may_differ_from_0() -> None:
-    faults = "{clock: {jitter_s: 0.1}, extrinsics: {rotation_deg: {uniform: [0, 1]}}}"
+    faults = (
+        "{clock: {jitter_s: 0.1}, extrinsics: {rotation_deg: {uniform: [0, 1]}}, "
+        "delivery: {lost: 0.1, late_s: 0.1}}"
+    )
     sensors = (
         f"sensors=[{{type: rgb_camera, faults: {faults}}}, "
         "{type: lidar, faults: {clock: {offset_s: 0}, extrinsics: {rotation_deg: 0}}}]"
@@ -110,9 +115,23 @@ def test_formats_learn_which_faults_may_differ_from_0() -> None:
     spec = load_config("tabletop.yaml", overrides=(sensors, "exporters=[{type: coco}]"))
     info = pipeline_config(spec, open_library(()), 1, (), frozenset()).info
     assert {s.name: s.faults for s in info.sensors} == {
-        "color": ("clock", "extrinsics"),
+        "color": ("clock", "extrinsics", "lost"),
         "lidar": (),
     }
+
+
+@pytest.mark.parametrize("view", ["", ", rectify: true"])
+def test_exporters_have_readings_that_arrive_and_refuse_doubled_ones(view: str) -> None:
+    def exporters(delivery: str) -> Any:
+        sensors = f"sensors=[{{type: rgb_camera, faults: {{delivery: {delivery}}}}}]"
+        formats = f"exporters=[{{type: coco{view}}}]"
+        spec = load_config("tabletop.yaml", overrides=(sensors, formats))
+        return pipeline_config(spec, open_library(()), 1, (), frozenset()).exporters
+
+    assert isinstance(exporters("{lost: 0.1}")["coco"], DeliveredExporter)
+    assert not isinstance(exporters("{lost: 0, late_s: 1}")["coco"], DeliveredExporter)
+    with pytest.raises(ConfigError, match=r"exporters\[0\].*'color': faults\.delivery\.doubled: "):
+        exporters("{doubled: 0.1}")
 
 
 def test_wrong_clocks_reach_the_rows_and_nothing_else() -> None:

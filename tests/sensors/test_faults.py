@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gen_data.core.capture import Channel, LidarHits, Measurements, PointCloud, SensorReading
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.measurement_dtypes import table_rows
-from gen_data.core.reported import reported
+from gen_data.core.reported import arrived_s, copies, reported, reported_s
 from gen_data.core.scene import Camera, Device, Lidar, Scene
 from gen_data.core.se3 import SE3, look_at
 from gen_data.core.serialization import canonical_json
@@ -22,7 +22,7 @@ from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_faults import LidarFaults
 from gen_data.sensors.navigation import gnss, imu
 from gen_data.sensors.navigation.navigation_faults import GnssFaults, ImuFaults
-from gen_data.sensors.sensor_faults import Clock, deliver, with_calibrations
+from gen_data.sensors.sensor_faults import Clock, Delivery, deliver, with_calibrations
 
 W, H = 64, 48
 CAMERA = Camera("color", SE3(), Intrinsics(W, H, 50.0, 50.0, W / 2, H / 2), ev100=5.0)
@@ -273,6 +273,54 @@ def test_readings_record_the_error_of_the_calibration() -> None:
     assert found["translation_m"] == 0.0
     stated = placed.T_world_camera.matrix() @ found["T_sensor_reported"]
     assert stated == pytest.approx(reported(placed).T_world_camera.matrix(), abs=2e-6)
+
+
+def line(reading: Any, step: int = 0, **fields: Any) -> Any:
+    delivery = Delivery.model_validate_json(json.dumps(fields))
+    return delivery.draw(reading, stream(step)).of(reading)
+
+
+def test_readings_are_lost_and_doubled_by_their_shares() -> None:
+    """Standard deviations of shares of 400 readings."""
+    found = [line(CLEAN, k, lost=0.3, doubled=0.5).faults.get("delivery", {}) for k in range(400)]
+    lost, doubled = (np.array([f.get(name, False) for f in found]) for name in ("lost", "doubled"))
+    assert not (lost & doubled).any()
+    assert lost.mean() == pytest.approx(0.3, abs=4 * math.sqrt(0.3 * 0.7 / 400))
+    assert doubled[~lost].mean() == pytest.approx(0.5, abs=4 * 0.5 / math.sqrt(280))
+    assert [copies(line(CLEAN, k, lost=0.3, doubled=0.5)) for k in range(400)] == list(
+        np.where(lost, 0, np.where(doubled, 2, 1))
+    )
+
+
+def test_late_readings_arrive_so_much_after_their_true_instant() -> None:
+    late = line(replace(CLEAN, time_s=1.5), late_s=0.2)
+    assert arrived_s(late) == pytest.approx(1.7, abs=1e-9)
+    assert (late.time_s, reported_s(late)) == (1.5, 1.5)
+    assert line(CLEAN, lost=0.0, doubled=0.0, late_s=0.0) is CLEAN
+
+
+def test_rows_of_lost_instants_are_missing_and_of_doubled_ones_there_twice() -> None:
+    """Two rows at each instant; a wrong clock stamps those that arrive."""
+    times_s = np.repeat(TIMES_S, 2)
+    rows = table_rows(imu.COLUMNS, len(times_s), time_s=times_s, force_x_m_s2=np.arange(480.0))
+    readings = Measurements("device", Device("device", "imu", "ego"), rows)
+    fields = '{"clock": {"jitter_s": 0.001}, "delivery": {"lost": 0.25, "doubled": 0.25}}'
+    sensor = imu.Imu.model_validate_json(f'{{"faults": {fields}}}')
+    found = deliver(sensor, readings, stream())
+    lost, doubled = (found.faults["delivery"][f"{name}_s"] for name in ("lost", "doubled"))
+    assert not set(lost) & set(doubled)
+    assert len(lost) / 240 == pytest.approx(0.25, abs=4 * math.sqrt(0.25 * 0.75 / 240))
+    expected = [
+        (time_s, k)
+        for k, time_s in enumerate(times_s.tolist())
+        if time_s not in lost
+        for _ in range(2 if time_s in doubled else 1)
+    ]
+    assert found.faults["clock"]["true_s"] == [time_s for time_s, _ in expected]
+    assert found.rows["force_x_m_s2"].tolist() == [k for _, k in expected]
+    stamped = sensor.faults.clock.stamp(readings, stream()).rows["time_s"]
+    stamps = dict(zip(times_s, stamped, strict=True))
+    assert found.rows["time_s"].tolist() == [stamps[time_s] for time_s, _ in expected]
 
 
 def test_labels_hold_the_truth_about_faults_and_are_as_before_without() -> None:

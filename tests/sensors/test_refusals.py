@@ -48,6 +48,7 @@ ROWS: list[tuple[str, dict[str, Any], str]] = [
     ("depth_camera", {"faults": {"dead_pixels": 0.1}}, "dead_pixels"),
     ("radar", {"faults": {"clock": {"offset_s": 61}}}, "offset_s"),
     ("gnss", {"faults": {"clock": {"jitter_s": -0.1}}}, "jitter_s"),
+    ("radar", {"faults": {"delivery": {"lost": 1.1}}}, "lost"),
     ("lidar", {"faults": {"extrinsics": {"rotation_deg": -1}}}, "rotation_deg"),
 ]
 
