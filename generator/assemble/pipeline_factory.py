@@ -110,6 +110,9 @@ class PipelineFactory:
             for error in preflight.unrectified_pairs(probe, scene, self.library):
                 with refused.collected(), located_errors(config.document):
                     raise error
+        if any(isinstance(annotator, Text) for annotator in annotators_of(config)):
+            with refused.collected(), located_errors(config.document):
+                preflight.check_text(config.probes, self.nominal, self.library)
         refused.raise_if_any()
         self._warn_of_doubtful_scenes()
 
