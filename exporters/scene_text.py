@@ -2,7 +2,7 @@
 
 ::
 
-    icdar2015/<split>/images/img_12.png       layout ``icdar2015``: links to the photographs (PNG, JPEG)
+    icdar2015/<split>/images/img_12.png       layout ``icdar2015``: links to the photographs
     icdar2015/<split>/gt/gt_img_12.txt        a line per word: x1,y1,x2,y2,x3,y3,x4,y4,transcription
     coco_text/images/<split>/12.png           layout ``coco_text``: links to the photographs
     coco_text/cocotext.v2.json                ``imgs``, ``anns`` and ``imgToAnns`` by id, ``cats``
@@ -147,7 +147,7 @@ def region(word: WordTruth) -> Array:
     if signed_area(box) < 0.0:
         box = box[::-1]
     first = int(np.linalg.norm(box - quads[0, 0], axis=1).argmin())
-    return np.round(np.roll(box, -first, axis=0).astype(np.float64), 2)
+    return np.asarray(np.round(np.roll(box, -first, axis=0).astype(np.float64), 2))
 
 
 def outline(word: WordTruth) -> Array:

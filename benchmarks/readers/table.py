@@ -231,5 +231,6 @@ WITHOUT_READER = {
     "map_vectors": "MapTR is in no registry",
     "opendrive": "our reader; ASAM's checker requires packages of its own (docs/maps.md)",
     "openlane": "its evaluation is in no registry",
+    "scene_text": "COCO-Text's interface and ICDAR's evaluation are in no registry",
 }
 """Formats without a row, with the reason; tests/exporters compares them with their formulas."""

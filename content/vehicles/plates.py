@@ -21,7 +21,6 @@ from gen_data.core.writing import NO_LANGUAGE
 
 if TYPE_CHECKING:
     from PIL.Image import Image
-    from PIL.ImageDraw import ImageDraw
 
 
 @dataclass(frozen=True)

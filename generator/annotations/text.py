@@ -244,12 +244,16 @@ def _describe(scene: Scene, line: _Line, view: _View) -> sample.TextTruth | None
             and bool((view.visible[rows] >= READABLE_SHARE).all())
         )
         stroke_px = line.text.stroke * height_px * scale
-        words.append(
-            sample.WordTruth(
-                word.text, _quad(view.image_px[rows.start - 1]), characters, round(share, 3),
-                round(height_px, 2), round(stroke_px, 2), readable,
-            )  # fmt: skip
+        made = sample.WordTruth(
+            word.text,
+            _quad(view.image_px[rows.start - 1]),
+            characters,
+            round(share, 3),
+            round(height_px, 2),
+            round(stroke_px, 2),
+            readable,
         )
+        words.append(made)
     visible = _mean(*np.array(shares).T)
     return sample.TextTruth(
         line.text.text, line.text.language, _quad(view.image_px[0]), body.name, body.instance_id,

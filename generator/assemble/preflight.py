@@ -7,6 +7,8 @@ import numpy as np
 
 from gen_data.annotations.text import can_write
 from gen_data.assemble.config import SceneConfig
+from gen_data.assets.families import known_families
+from gen_data.assets.family import Family
 from gen_data.assets.library import Library
 from gen_data.core import errors, interfaces, scene_time, stereo, streams
 from gen_data.core.scene import Camera, Region, Scene
@@ -62,9 +64,9 @@ def _fault_of_pair(left: Camera, right: Camera) -> str:
 
 
 def check_text(
-    configs: Iterable[SceneConfig], scenes: Iterable[Scene], assets: Library
+    configs: Iterable[SceneConfig], scenes: Iterable[Scene], assets: Library, place: str
 ) -> None:
-    """Refuse scenes in which nothing can be written on.
+    """Refuse scenes in which nothing can be written on; ``place`` begins the message.
 
     Raises:
         ConfigError: no body, and no asset that may be added, has a texture with text.
@@ -84,14 +86,16 @@ def check_text(
     for asset_id in ids:
         family = asset_id.partition("?")[0]
         turns[family] = order[asset_id] = turns.get(family, -1) + 1
+    known = known_families()
     for asset_id in sorted(ids, key=order.__getitem__):
-        if assets.get(asset_id).kind == "object":
+        # Of files it is not known what is on their images.
+        if isinstance(known.get(asset_id.partition("?")[0]), Family):
             textures = tuple(material.texture for material in assets.materials(asset_id))
             if can_write(assets, textures):
                 return
     raise errors.ConfigError(
-        "annotations: text: nothing in the scenes is written on; add objects with print, such as "
-        "assets: {tags: [printed]}, signs, vehicles or buildings, or leave text and its formats out"
+        f"{place}: nothing in the scenes is written on; add objects with print, such as "
+        "assets: {tags: [printed]}, signs, vehicles or buildings, or leave it out"
     )
 
 

@@ -80,9 +80,9 @@ class SurfacePoints:
         return np.asarray(turned + t[inverse])
 
     def moving(self, scene: Scene, p_body: se3.Array) -> Callable[[se3.Array], se3.Array]:
-        """World coordinates [m] of ``on_bodies``, [n, 3], by delays [s], [n], from the scene's time.
+        """World coordinates [m] of ``on_bodies``, [n, 3], as a function of delays [s], [n].
 
-        Meshes remain as they are in the scene; bodies move.
+        Delays count from the scene's time. Meshes remain as they are then; bodies move.
         """
         p_world = self.in_world(scene, p_body)
         tracks = {track.body: track for track in scene.tracks}

@@ -142,12 +142,14 @@ class _Chart:
         two = np.einsum(
             "nij,nj->ni", self.inverse[triangle], uv - self.origin[triangle], optimize=False
         )
-        return np.column_stack([1.0 - two.sum(axis=1), two])
+        return np.asarray(np.column_stack([1.0 - two.sum(axis=1), two]))
 
     def positions_m(self, uv: Array, triangle: Rows) -> Array:
         """Points [n, 3] of places [n, 2] on the planes of triangles."""
         weights = self.weights(uv, triangle)
-        return np.asarray(np.einsum("nk,nki->ni", weights, self.corners_m[triangle], optimize=False))
+        return np.asarray(
+            np.einsum("nk,nki->ni", weights, self.corners_m[triangle], optimize=False)
+        )
 
     def hits(self, uv: Array) -> tuple[Rows, Rows]:
         """Rows of places [n, 2] and the triangles that contain them, all pairs by place."""

@@ -287,7 +287,8 @@ def rectified_truth(
 
     Returns:
         The annotations without those that the original image alone supports: sentences
-        (``utterances``) and written text (``texts``). Results of third-party annotators (``extra``) are those of the original.
+        (``utterances``) and written text (``texts``). Results of third-party annotators
+        (``extra``) are those of the original.
     """
     camera = replace(truth.camera, intrinsics=bent.target)
     masks = {t.instance.instance_id: bent.mask(t.mask) for t in truth.objects if t.mask is not None}

@@ -35,5 +35,6 @@ def draw_texts(image: Image, texts: Sequence[TextTruth], unit: float = 1.0) -> N
         whole = len(seen) == len(word.characters)
         quads = [word.quad_px] if whole else [c.quad_px for c in seen]
         places = np.rint((np.array(quads).reshape(-1, 4, 2) - 0.5) * (1 << _SHIFT))
-        cv2.polylines(image, list(places.astype(np.int32)), isClosed=True, color=word_color(word),
-                      thickness=max(1, round(unit)), lineType=cv2.LINE_AA, shift=_SHIFT)  # fmt: skip
+        lines, width = list(places.astype(np.int32)), max(1, round(unit))
+        cv2.polylines(image, lines, isClosed=True, color=word_color(word), thickness=width,
+                      lineType=cv2.LINE_AA, shift=_SHIFT)  # fmt: skip

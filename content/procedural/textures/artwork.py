@@ -61,7 +61,7 @@ def language_of(text: str) -> str:
     """
     if text.casefold() in _LANGUAGE:
         return _LANGUAGE[text.casefold()]
-    words = [word.strip(".,;:!?()“”\"").casefold() for word in text.split()]
+    words = [word.strip('.,;:!?()“”"').casefold() for word in text.split()]
     found = {_LANGUAGE.get(w, "en") for w in words if sum(map(str.isalpha, w)) > 1}
     found -= {writing.NO_LANGUAGE}
     found = found - {writing.UNDETERMINED} or found or {writing.NO_LANGUAGE}
@@ -90,7 +90,7 @@ def note(
     high = float((places[:, 3] - places[:, 1]).max())
     shares = writing.boxes_to_quads(places) / image.size
     language = language or language_of(text)
-    line = writing.Writing(text, language, shares, stroke_px / max(high, 1.0))
+    line = writing.Writing(text.strip(), language, shares, stroke_px / max(high, 1.0))
     image.info[_WRITING] = (*_noted(image), line)
 
 
@@ -154,20 +154,17 @@ def atlas(faces: Mapping[str, Image], places: Mapping[str, UvRect], ground: Colo
     return TextureData(np.array(sheet, dtype=np.uint8))
 
 
-def text(
-    image: Image, box: Box, text: str, fill: Color, bold: int, language: str = ""
-) -> None:
+def text(image: Image, box: Box, text: str, fill: Color, bold: int, language: str = "") -> None:
     """Text fitted into a box (fractions, y down), centred, at most a quarter narrower or wider.
 
     ``language`` is the text's; empty = found by its words.
     """
-    from PIL import ImageFont
     from PIL.Image import Resampling
 
     x0, y0, x1, y1 = pixels(image, box)
     if x1 - x0 < 4 or y1 - y0 < 3:
         return
-    font = ImageFont.load_default(size=72)
+    font = _font(72)
     left, top, right, bottom = font.getbbox(text, stroke_width=bold)
     mask = canvas(int(right - left) + 2, int(bottom - top) + 2, (0, 0, 0))
     pen(mask).text((1 - left, 1 - top), text, fill=(255, 255, 255), font=font, stroke_width=bold)
@@ -181,9 +178,18 @@ def text(
     at = (x0 + x1 - w) // 2, (y0 + y1 - h) // 2
     image.paste(fill, at, small)
     if writing.is_recorded():
-        scale = small.width / mask.width, small.height / mask.height
+        resized = small.width / mask.width, small.height / mask.height
         boxes = _ink_boxes(text, font, (1 - left, 1 - top), bold)
-        note(image, text, _placed(boxes, scale, at), _stem_px(font, bold) * scale[0], language)
+        note(image, text, _placed(boxes, resized, at), _stem_px(font, bold) * resized[0], language)
+
+
+def _font(size: float) -> FreeTypeFont:
+    """Pillow's own typeface."""
+    from PIL import ImageFont
+
+    font = ImageFont.load_default(size=size)
+    assert isinstance(font, ImageFont.FreeTypeFont), "of a size"
+    return font
 
 
 def _ink_boxes(text: str, font: FreeTypeFont, at: Place, bold: int = 0) -> list[Box]:
@@ -206,7 +212,7 @@ def _ink_box(font: FreeTypeFont, letter: str, bold: int) -> Box:
 
 def _stem_px(font: FreeTypeFont, bold: int = 0) -> float:
     """Width of upright strokes."""
-    left, _, right, _ = _ink_box(font, "l", bold)
+    left, _, right, _ = _ink_box(font, "I", bold)
     return right - left
 
 
@@ -256,12 +262,10 @@ def lettering(
 
 def lines(image: Image, box: Box, ink: Color, ground: Color, words: Sequence[str]) -> None:
     """Small print: words set in lines that fill a box; they begin again where they end."""
-    from PIL import ImageFont
-
     draw = pen(image)
     x0, y0, x1, y1 = pixels(image, box)
     pitch = max(8, image.height // 26)
-    font = ImageFont.load_default(size=pitch - 1)
+    font = _font(pitch - 1)
     fill, i = blend(ink, ground, 0.15), 0
     for y in range(y0, y1 - pitch + 1, pitch):
         line = words[i % len(words)]
@@ -283,13 +287,11 @@ NUTRIENTS = ("Energy", "Fat", "  saturates", "Carbohydrate", "  sugars", "Protei
 
 def table(image: Image, box: Box, ink: Color, rng: VariantRng) -> None:
     """Nutrition facts: names and drawn amounts."""
-    from PIL import ImageFont
-
     draw = pen(image)
     x0, y0, x1, y1 = pixels(image, box)
     draw.rectangle([x0, y0, x1, y1], outline=ink, fill=(248, 248, 246))
     pitch = (y1 - y0) / (len(NUTRIENTS) + 1)
-    font = ImageFont.load_default(size=max(5.0, 0.8 * pitch))
+    font = _font(max(5.0, 0.8 * pitch))
     for i, name in enumerate(("per 100 g", *NUTRIENTS)):
         y = y0 + i * pitch
         draw.line([x0, y + pitch, x1, y + pitch], fill=(60, 60, 60), width=1)
