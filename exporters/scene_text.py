@@ -8,7 +8,7 @@
     coco_text/cocotext.v2.json                ``imgs``, ``anns`` and ``imgToAnns`` by id, ``cats``
 
 Words without a visible character are left out. The region of a word is the quad of the word; where
-some of its characters are hidden or outside the image, it is that of the others, and not readable.
+some of its characters are hidden or outside the image, it covers the others, and is not readable.
 
 * **icdar2015**: UTF-8 with a byte order mark; whole pixels along the edges of pixels, clockwise
   from the top left of the upright word; ``###`` stands for words that are not readable.
