@@ -179,7 +179,7 @@ class _Chart:
         for p, t, d in zip(place.tolist(), triangle.tolist(), away_m.tolist(), strict=True):
             if d < best_m[p]:
                 found[p], best_m[p] = t, d
-        return found
+        return np.asarray(found)
 
 
 @dataclass(slots=True)
