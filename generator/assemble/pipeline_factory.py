@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache, partial
 import cv2
 
 from gen_data.annotations.annotate import annotate_ego, annotate_reading
+from gen_data.annotations.text import Text
 from gen_data.assemble import plugin_tables, preflight
 from gen_data.assemble.config import Config, SceneConfig
 from gen_data.assets.library import Library
@@ -115,6 +116,13 @@ class PipelineFactory:
             ):
                 with refused.collected(), located_errors(config.document):
                     raise error
+        if any(isinstance(annotator, Text) for annotator in annotators_of(config)):
+            asking = (e.type for e in config.exporters if "text" in exporter_views.needs_of(e))
+            place = "annotations.text"
+            if "text" not in config.annotations:
+                place = f"exporter '{next(asking)}'"
+            with refused.collected(), located_errors(config.document):
+                preflight.check_text(config.probes, self.nominal, self.library, place)
         refused.raise_if_any()
         self._warn_of_doubtful_scenes()
 

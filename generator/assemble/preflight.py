@@ -5,7 +5,11 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from gen_data.annotations.text import can_write
 from gen_data.assemble.config import SceneConfig
+from gen_data.assets.families import known_families
+from gen_data.assets.family import Family
+from gen_data.assets.library import Library
 from gen_data.core import errors, interfaces, scene_time, stereo, streams
 from gen_data.core.scene import Camera, Region, Scene
 from gen_data.randomizers.camera_pose import CameraPose
@@ -106,6 +110,42 @@ def tiny_fiducials(
 
 def _placed_by(camera: Camera, orbits: Iterable[CameraPose]) -> list[CameraPose]:
     return [orbit for orbit in orbits if orbit.camera in ("", camera.name)]
+
+
+def check_text(
+    configs: Iterable[SceneConfig], scenes: Iterable[Scene], assets: Library, place: str
+) -> None:
+    """Refuse scenes in which nothing can be written on; ``place`` begins the message.
+
+    Raises:
+        ConfigError: no body, and no asset that may be added, has a texture with text.
+    """
+    ids: dict[str, None] = {}
+    for config, scene in zip(configs, scenes, strict=True):
+        materials = (material for body in scene.bodies for material in body.materials)
+        if can_write(assets, tuple(material.texture for material in materials)):
+            return
+        ids |= dict.fromkeys(body.asset for body in scene.bodies)
+        ids |= dict.fromkeys(asset for group in scene.groups for asset in group.assets)
+        for randomizer in config.randomizers:
+            ids |= dict.fromkeys(randomizer.possible_assets(assets))
+    # One variant of each family first: most families have text on all variants or on none.
+    turns: dict[str, int] = {}
+    order = {}
+    for asset_id in ids:
+        family = asset_id.partition("?")[0]
+        turns[family] = order[asset_id] = turns.get(family, -1) + 1
+    known = known_families()
+    for asset_id in sorted(ids, key=order.__getitem__):
+        # Of files it is not known what is on their images.
+        if isinstance(known.get(asset_id.partition("?")[0]), Family):
+            textures = tuple(material.texture for material in assets.materials(asset_id))
+            if can_write(assets, textures):
+                return
+    raise errors.ConfigError(
+        f"{place}: nothing in the scenes is written on; add objects with print, such as "
+        "assets: {tags: [printed]}, signs, vehicles or buildings, or leave it out"
+    )
 
 
 def far_sensors(config: SceneConfig, scene: Scene) -> Iterator[str]:

@@ -14,6 +14,7 @@ from gen_data.core.asset_types import Asset, Float32, Symmetry, TextureData
 from gen_data.core.bounded_cache import CountCache, Sized
 from gen_data.core.errors import AssetError, did_you_mean
 from gen_data.core.variant_rng import Draw, drawing
+from gen_data.core.writing import recording
 
 VERSION = 4
 """Increased whenever code shared by all families generates different geometry."""
@@ -136,6 +137,16 @@ class ProceduralLibrary:
         return self._result(
             asset_id, family, compute, asset_arrays.pack_texture, asset_arrays.unpack_texture
         )
+
+    def writing(self, asset_id: AssetId) -> asset_cache.Arrays:
+        """Lines of text on a texture, as ``pack_writing`` has them; makes the texture."""
+        family = self._find(asset_id, TextureFamily, "a texture")
+        try:
+            with recording() as lines:
+                _make(asset_id, family)
+        except ValueError as error:
+            raise AssetError(f"asset '{asset_id}': {error}") from error
+        return asset_arrays.pack_writing(lines)
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""

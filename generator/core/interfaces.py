@@ -55,6 +55,7 @@ from gen_data.core.capture import (
 from gen_data.core.lens import LensModel
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
 from gen_data.core.scene import Camera, Lane, Lidar, Scene, StageModel
+from gen_data.core.writing import Writing
 
 
 class Stage(str, Enum):
@@ -188,6 +189,18 @@ class DerivedArrays(Protocol):
             asset_id: Also ``<asset>#<image>``.
             name: Of the computation and everything else that the result depends on.
             compute: Computes them; its result depends on the asset and the name alone.
+        """
+        ...
+
+
+@runtime_checkable
+class WrittenTextures(Protocol):
+    """An AssetLibrary that knows what is written on its textures."""
+
+    def writing(self, texture_id: str) -> tuple[Writing, ...]:
+        """Lines of text on a texture, in the order of drawing.
+
+        Empty for textures without text, and for images of files. Raises AssetError as the library.
         """
         ...
 

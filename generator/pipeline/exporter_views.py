@@ -109,7 +109,7 @@ class ExporterView:
         seen = self.info(info)
         check_image_formats(self, seen)
         check_delivery(getattr(self.exporter, "exporter", self.exporter), seen)
-        if self.rectify and "language" in self.exporter.needs:
+        if self.rectify and {"language", "text"} & self.exporter.needs:
             raise ConfigError(
                 f"{self._place}: rectify: its texts are about the images as they are; "
                 "expected a camera with a pinhole"

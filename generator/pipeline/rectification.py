@@ -286,8 +286,9 @@ def rectified_truth(
         parts: Rectified part ids [height, width]; None = not known, then ``part_px`` is None.
 
     Returns:
-        The annotations without those that the original image alone supports: texts
-        (``utterances``). Results of third-party annotators (``extra``) are those of the original.
+        The annotations without those that the original image alone supports: sentences
+        (``utterances``) and written text (``texts``). Results of third-party annotators
+        (``extra``) are those of the original.
     """
     camera = replace(truth.camera, intrinsics=bent.target)
     masks = {t.instance.instance_id: bent.mask(t.mask) for t in truth.objects if t.mask is not None}
@@ -333,6 +334,7 @@ def rectified_truth(
         else _clipped(bent.mask(truth.free_space), bent),
         relations=relations,
         utterances=None,
+        texts=None,
     )
 
 

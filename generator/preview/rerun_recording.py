@@ -35,9 +35,10 @@ from gen_data.core.sample import (
     Occupancy,
     Sample,
     SensorTracks,
+    TextTruth,
 )
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.preview import lane_view, overlay, palette, sensor_views, voxel_view
+from gen_data.preview import lane_view, overlay, palette, sensor_views, text_view, voxel_view
 
 TIMELINE = "sample"
 TIME = "time"
@@ -244,6 +245,8 @@ class Recorder:
         self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
         if truth.borders is not None:
             self.stream.log(f"{path}/image/lanes", lane_strips_2d(truth.borders))
+        if truth.texts is not None:
+            self.stream.log(f"{path}/image/texts", text_strips(truth.texts))
         self._record_keypoints(f"{path}/image/keypoints", truth)
 
     def _record_keypoints(self, path: str, truth: ImageTruth) -> None:
@@ -450,6 +453,18 @@ def lane_strips_2d(borders: Sequence[BorderTruth]) -> rr.LineStrips2D:
         [line for _, _, line in parts],
         colors=[lane_view.border_color(kind, visible=seen) for kind, seen, _ in parts],
         radii=[-1.5 if seen else -0.75 for _, seen, _ in parts],
+    )
+
+
+def text_strips(texts: Sequence[TextTruth]) -> rr.LineStrips2D:
+    """Convert words in an image: outlines with the text, in the colours of ``text_view``."""
+    words = [word for text in texts for word in text.words if word.visible_fraction > 0.0]
+    return rr.LineStrips2D(
+        [[*word.quad_px, word.quad_px[0]] for word in words],
+        colors=[text_view.word_color(word) for word in words],
+        labels=[word.text for word in words],
+        show_labels=False,
+        radii=-1.0,
     )
 
 

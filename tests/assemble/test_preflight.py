@@ -200,3 +200,23 @@ def test_a_marker_below_a_pixel_in_every_image_is_refused() -> None:
 
 def test_a_marker_that_some_draw_brings_near_is_accepted() -> None:
     check(marker({"uniform": [0.3, 3.0]}))
+
+
+def prints(*ids: str, **sections: Any) -> dict[str, Any]:
+    """Some assets on a table."""
+    desk = {"type": "surface", "name": "desk", "asset": "table", "top_size_m": [1.3, 0.9]}
+    things = {"type": "objects", "name": "things", "on": "desk", "assets": {"ids": [*ids]}}
+    config = cart({**CAMERA, "name": "front"}, **sections)
+    return {**config, "elements": [*config["elements"], desk, things]}
+
+
+@pytest.mark.filterwarnings("ignore::gen_data.ConfigWarning")
+def test_text_is_refused_where_nothing_is_written_on() -> None:
+    """Apples have none; of mugs some have. Also if only a format asks for it."""
+    expected = "nothing in the scenes is written on; add objects with print"
+    message = refusal(prints("apple?seed=0", annotations=["boxes2d", "text"]))
+    assert f": annotations[1]: {expected}" in message
+    message = refusal(prints("apple?seed=0", exporters=[{"type": "scene_text"}]))
+    assert f": exporters[0]: exporter 'scene_text': {expected}" in message
+    check(prints("apple?seed=0", "mug?seed=0", "mug?seed=44", annotations=["text"]))
+    check(prints("apple?seed=0"))

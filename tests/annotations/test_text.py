@@ -1,0 +1,285 @@
+"""Written text: ink that rays of Embree find is in the quads, and hidden where they miss it."""
+
+import json
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gen_data.annotations.text import CAPITALS_PX, LETTERS_PX, Text
+from gen_data.assets.families import known_families
+from gen_data.assets.family import TextureFamily
+from gen_data.content.procedural.textures import artwork as art
+from gen_data.core.asset_types import Material, MeshData
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.sample import ImageTruth, TextTruth, WordTruth
+from gen_data.core.scene import Body, Camera, Scene
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.core.writing import Writing, recording
+from tests.embree import RayCaster, placed
+from tests.renderers.fake_library import FakeLibrary, box_mesh
+
+SHEET_PX = (2048, 1024)
+PRINT = Material(texture="texture/print")
+BENT_LENS = Lens("brown_conrady", (-0.25, 0.06, 0.001, -0.001, 0.0, 0.0, 0.0, 0.0))
+TWO_LINES = "Rue du Port", "A-12 g"
+
+
+@cache
+def printed() -> tuple[NDArray[np.bool_], tuple[Writing, ...]]:
+    """Ink of a sheet with two lines, row 0 at its top, and the lines."""
+    image = art.canvas(*SHEET_PX, (255, 255, 255))
+    with recording() as lines:
+        art.text(image, (0.1, 0.1, 0.9, 0.45), TWO_LINES[0], (0, 0, 0), 2)
+        art.lettering(image, (0.25, 0.55, 0.75, 0.85), TWO_LINES[1], (0, 0, 0), "serif", 4)
+        art.record(image)
+    return np.array(image)[..., 0] < 128, tuple(lines)
+
+
+def surface(points: Any, u: Any, v: Any) -> MeshData:
+    """Points [rows, columns, 3] from the top down as a printed sheet, read from its outside."""
+    rows, columns = points.shape[:2]
+    ids = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]
+    faces = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, d, c), (a, c, b))])
+    uvs = np.stack(np.broadcast_arrays(u[None, :], v[:, None]), -1).reshape(-1, 2)
+    return MeshData(
+        points.reshape(-1, 3).astype(np.float32), faces.astype(np.int32),
+        np.zeros((rows * columns, 3), np.float32), uvs.astype(np.float32),
+        np.zeros(len(faces), np.int32), (PRINT,),
+    )  # fmt: skip
+
+
+def flat(u: tuple[float, float] = (0.0, 1.0), step: int = 2) -> MeshData:
+    """A sheet 0.4 m wide in the plane X = 0, read from +X, where Y points to the right."""
+    shares, rows = np.linspace(*u, step), np.array((1.0, 0.0))
+    y, z = 0.4 * (shares - 0.5), 0.2 * (rows - 0.5)
+    points = np.stack(np.broadcast_arrays(0.0, y[None, :], z[:, None]), -1)
+    return surface(points, shares, rows)
+
+
+def drum(radius_m: float = 0.09) -> MeshData:
+    """The same sheet around a cylinder about Z, its middle at +X."""
+    shares, rows = np.linspace(0.0, 1.0, 65), np.array((1.0, 0.0))
+    turn = 0.4 / radius_m * (shares - 0.5)
+    x, y = radius_m * np.cos(turn), radius_m * np.sin(turn)
+    z = 0.2 * (rows - 0.5)
+    return surface(np.stack(np.broadcast_arrays(x, y, z[:, None]), -1), shares, rows)
+
+
+class Printed(FakeLibrary):
+    """A library whose texture ``texture/print`` is the sheet of ``printed``."""
+
+    def writing(self, texture_id: str) -> tuple[Writing, ...]:
+        return printed()[1] if texture_id == PRINT.texture else ()
+
+
+ASSETS = Printed({"flat": flat(), "fine": flat(step=41), "drum": drum(), "box": box_mesh(),
+                  "cut": flat((0.0, 0.5)), "tiled": flat((0.0, 2.0))})  # fmt: skip
+BLOCK = Body("block", "box", SE3((0.15, 0.06, 0.03)), scale=0.05, instance_id=2)
+
+
+def camera(distance_m: float, *, side: float = 0.35, lens: Lens = BENT_LENS) -> Camera:
+    """A camera that looks at the origin from +X, from aside and above."""
+    eye = (distance_m, side * distance_m, 0.3 * distance_m)
+    return Camera("color", look_at(eye, (0.0, 0.0, 0.0)),
+                  Intrinsics(640, 480, 700.0, 700.0, 320.0, 240.0, lens))  # fmt: skip
+
+
+@dataclass
+class Seen:
+    """An image by Embree: ids, numbers of bodies and whether a pixel shows ink."""
+
+    truth: tuple[TextTruth, ...]
+    body: NDArray[np.int32]
+    ink: NDArray[np.bool_] = field(repr=False)
+
+
+def look(asset: str, view: Camera, *others: Body, **fields: float) -> Seen:
+    bodies = (Body("print", asset, instance_id=1), *others)
+    scene = Scene("s", bodies=bodies, cameras=(view,))
+    rays = view.T_world_camera.rotate(view.intrinsics.pixel_rays())
+    eye = np.array(view.T_world_camera.translation_m)
+    hits = RayCaster(*(placed(body, ASSETS) for body in bodies)).cast(eye, rays)
+    ids = np.array([0, *(body.instance_id for body in bodies)], np.uint16)[hits.mesh + 1]
+    length = np.linalg.norm(rays, axis=-1)
+    channels = {Channel.INSTANCE: ids, Channel.RANGE: (hits.distance * length).astype(np.float32)}
+    reading = SensorReading("color", view, channels)
+    truth = Text(**fields).annotate_image(scene, ASSETS, reading, ImageTruth(view, ()))
+    assert truth.texts is not None
+    own = hits.mesh == 0
+    ink = np.zeros(own.shape, np.bool_)
+    ink[own] = inked(
+        ASSETS.mesh(asset), hits.face[own], (eye + rays * hits.distance[..., None])[own]
+    )
+    return Seen(truth.texts, hits.mesh, ink)
+
+
+def inked(mesh: MeshData, face: Any, points_m: Any) -> NDArray[np.bool_]:
+    """Whether points [n, 3] on triangles [n] show ink, by the interpolated UVs."""
+    known, number = np.unique(face, return_inverse=True)
+    corners = mesh.vertices_m[mesh.faces[known]].astype(np.float64)
+    edges = np.linalg.pinv(
+        np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], -1)
+    )
+    two = np.einsum("nij,nj->ni", edges[number], points_m - corners[number, 0])
+    weights = np.column_stack([1.0 - two.sum(axis=1), two])
+    u, v = np.einsum("nk,nki->in", weights, mesh.uvs[mesh.faces[face]].astype(np.float64))
+    columns = np.floor(u % 1.0 * SHEET_PX[0]).astype(int).clip(0, SHEET_PX[0] - 1)
+    rows = np.floor((1.0 - v % 1.0) * SHEET_PX[1]).astype(int).clip(0, SHEET_PX[1] - 1)
+    return np.asarray(printed()[0][rows, columns])
+
+
+def to_sides(quad: Any, points: Any) -> Any:
+    """Signed distances [n, 4] of points [n, 2] to the sides of a quad, inside positive [px]."""
+    start = np.asarray(quad)
+    along = np.roll(start, -1, axis=0) - start
+    normal = np.stack([-along[:, 1], along[:, 0]], -1) / np.linalg.norm(along, axis=1)[:, None]
+    return ((points[:, None] - start) * normal).sum(axis=2)
+
+
+def characters(seen: Seen) -> list[Any]:
+    return [c for text in seen.truth for word in text.words for c in word.characters]
+
+
+def words(seen: Seen) -> list[WordTruth]:
+    return [word for text in seen.truth for word in text.words]
+
+
+@pytest.mark.parametrize("asset", ["flat", "fine", "drum"])
+def test_ink_lies_in_the_quads_of_characters_and_touches_their_sides(asset: str) -> None:
+    """Through a distorting lens, to less than a pixel, and to the chord of a character if bent."""
+    slack_px = 2.0 if asset == "drum" else 0.75
+    seen = look(asset, camera(0.55))
+    assert [text.text for text in seen.truth] == list(TWO_LINES)
+    centres = np.argwhere(seen.ink)[:, ::-1] + 0.5
+    covered = np.zeros(len(centres), np.bool_)
+    for character in characters(seen):
+        if character.visible_fraction == 1.0:
+            gaps = to_sides(character.quad_px, centres)
+            inside = (gaps > -slack_px).all(axis=1)
+            assert np.abs(gaps[inside].min(axis=0)).max() < slack_px + 0.75, character.text
+            covered |= inside
+        else:
+            covered |= (to_sides(character.quad_px, centres) > -2.5).all(axis=1)
+    assert covered.mean() > 0.999 and len(centres) > 3000
+    if asset != "drum":
+        assert all(c.visible_fraction == 1.0 for c in characters(seen))
+        # Also words and lines, but for the curvature of the lens.
+        for word in words(seen):
+            assert (to_sides(word.quad_px, np.array(word.characters[0].quad_px)) > -1.5).all()
+
+
+def test_characters_are_in_reading_order_from_the_top_left_clockwise() -> None:
+    seen = look("flat", camera(0.5, side=0.0))
+    for text, expected in zip(seen.truth, TWO_LINES, strict=True):
+        assert " ".join(w.text for w in text.words) == expected
+        for word in text.words:
+            assert "".join(c.text for c in word.characters) == word.text
+            (x0, y0), (x1, y1), (x2, y2), (x3, y3) = word.quad_px
+            assert x0 < x1 and x3 < x2 and y0 < y3 and y1 < y2
+            lefts = [c.quad_px[0][0] for c in word.characters]
+            assert lefts == sorted(lefts)
+    assert [t.language for t in seen.truth] == ["fr", "zxx"]
+
+
+def test_visible_shares_are_those_of_pixels_by_rays() -> None:
+    """A block hides some characters, the curvature of the drum others."""
+    some = 0
+    for name, others in (("drum", ()), ("flat", (BLOCK,)), ("drum", (BLOCK,))):
+        seen = look(name, camera(0.5), *others)
+        for word in words(seen):
+            quads = np.array([c.quad_px for c in word.characters])
+            shown, hidden = coverage(seen.body, quads), word.visible_fraction
+            if shown is not None:
+                assert hidden == pytest.approx(shown, abs=0.06), word.text
+                some += 0.1 < shown < 0.95
+        text = seen.truth[0]
+        assert text.visible_fraction < 1.0
+        assert text.instance_id == 1 and text.body == "print"
+    assert some >= 3, "some words are partly hidden"
+
+
+def coverage(body: Any, quads: Any) -> float | None:
+    """Share of the pixels in some quads that show the print; None where one is seen edge-on."""
+    inside = np.zeros(body.shape, np.uint8)
+    for quad in quads:
+        area = cv2.contourArea(quad.astype(np.float32), oriented=True)
+        if area < 60.0:
+            return None
+        one = np.zeros_like(inside)
+        cv2.fillPoly(one, [np.rint((quad - 0.5) * 16.0).astype(np.int32)], 1, shift=4)
+        inside |= one
+    return float((body[inside > 0] == 0).mean())
+
+
+def test_text_is_readable_from_the_size_of_the_standard_on_and_if_half_of_each_letter_shows() -> (
+    None
+):
+    """ISO 9241-303: 7 px for digits and capitals, 9 px for letters of both cases."""
+    for distance_m in (1.0, 2.6, 4.0, 7.0):
+        for word in words(look("flat", camera(float(distance_m), side=0.0), min_height_px=0.5)):
+            least = CAPITALS_PX if word.text in ("A-12",) else LETTERS_PX
+            # Seen from above, heights are shortened more than widths.
+            assert word.readable == (word.height_px >= least), word
+    high = words(look("flat", camera(1.5, side=0.0)))[0]
+    tops = [np.subtract(c.quad_px[3], c.quad_px[0]) for c in high.characters]
+    assert high.height_px == pytest.approx(max(np.linalg.norm(t) for t in tops), rel=0.03)
+    aside = words(look("flat", camera(1.5, side=6.0), min_height_px=0.5))
+    assert not any(word.readable for word in aside)
+    hidden = words(look("flat", camera(0.5), BLOCK))
+    assert any(word.visible_fraction > 0.0 and not word.readable for word in hidden)
+
+
+def test_strokes_have_the_width_of_the_ink() -> None:
+    """Runs of ink across the l-shaped strokes of a line in plain letters."""
+    seen = look("flat", camera(0.5, side=0.0))
+    word = next(w for w in words(seen) if w.text == "du")
+    d = np.array(word.characters[0].quad_px)
+    rows = range(int(d[:, 1].min()) + 3, int(d[:, 1].min()) + 9)
+    runs = [
+        int(seen.ink[row, int(d[:, 0].min()) - 1 : int(d[:, 0].max()) + 1].sum()) for row in rows
+    ]
+    assert word.stroke_px == pytest.approx(float(np.median(runs)), abs=1.5)
+
+
+def test_text_is_listed_once_per_place_and_cut_where_the_surface_ends() -> None:
+    """A sheet with two repetitions, and one with the left half only; backs have none."""
+    assert [t.text for t in look("tiled", camera(1.0, side=0.0)).truth] == [
+        line for line in TWO_LINES for _ in range(2)
+    ]
+    cut = look("cut", camera(0.5, side=0.0)).truth
+    assert [t.complete for t in cut] == [False, False]
+    assert all(t.text and line.startswith(t.text) for t, line in zip(cut, TWO_LINES, strict=True))
+    behind = replace(camera(0.5), T_world_camera=look_at((-0.5, 0.1, 0.1), (0.0, 0.0, 0.0)))
+    assert look("flat", behind).truth == ()
+
+
+def test_annotations_survive_being_stored() -> None:
+    truth = ImageTruth(camera(0.5), (), texts=look("flat", camera(0.5)).truth)
+    assert from_plain(ImageTruth, json.loads(canonical_json(truth))).texts == truth.texts
+    assert "texts" not in canonical_json(ImageTruth(camera(0.5), ()))
+
+
+@pytest.mark.slow
+def test_families_of_textures_declare_whether_they_write() -> None:
+    """Those that record text for one of four seeds do; the others of these for one of twenty."""
+    for name, family in known_families().items():
+        if isinstance(family, TextureFamily):
+            declared = bool(family.declares.get("writing"))
+            found = False
+            for seed in range(20 if declared else 4):
+                with recording() as lines:
+                    family.build(seed=seed, **family.parameters)
+                found = found or bool(lines)
+                if found:
+                    break
+            kinds = "kind" in family.parameters
+            assert declared == found or (declared and kinds), name
