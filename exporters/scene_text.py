@@ -13,12 +13,12 @@ some of its characters are hidden or outside the image, it covers the others, an
 * **icdar2015**: UTF-8 with a byte order mark; whole pixels along the edges of pixels, clockwise
   from the top left of the upright word; ``###`` stands for words that are not readable.
 * **coco_text**: ``mask`` is the outline of the visible characters, along their upper edges and back
-  along the lower ones: bent words have more than four corners. ``bbox`` is left, top, width,
-  height; ``legibility`` ``legible`` or ``illegible`` (with an empty ``utf8_string``); ``language``
-  ``english``, ``not english``, or ``na`` for numbers, codes and invented names; ``class``
-  ``machine printed``, or ``handwritten`` for strokes that only look like writing. Further keys
-  tell the true ``text`` with the code of its language, ``visible_fraction``, ``height_px`` and
-  ``instance_id`` (0 = background).
+  along the lower ones: bent words have more than four corners. ``polygon`` is the quad, as in
+  version 1. ``bbox`` is left, top, width, height; ``legibility`` ``legible`` or ``illegible`` (with
+  an empty ``utf8_string``); ``language`` ``english``, ``not english``, or ``na`` for numbers, codes
+  and invented names; ``class`` ``machine printed``, or ``handwritten`` for strokes that only look
+  like writing. Further keys tell the true ``text`` with the code of its language,
+  ``visible_fraction``, ``height_px`` and ``instance_id`` (0 = background).
 
 Reference: Karatzas et al., "ICDAR 2015 Competition on Robust Reading", challenge 4; Veit et al.,
 "COCO-Text", arXiv:1601.07140, and the files of its version 2.
@@ -201,6 +201,7 @@ def _add_image(coco: dict[str, Any], row: dict[str, Any], file: str) -> None:
             "image_id": number,
             "bbox": np.round([x0, y0, x1 - x0, y1 - y0], 2).tolist(),
             "mask": points.reshape(-1).tolist(),
+            "polygon": [coordinate for corner in word["quad"] for coordinate in corner],
             "area": round(abs(signed_area(points)), 2),
             "class": "machine printed" if word["text"] else "handwritten",
             "legibility": "legible" if word["readable"] else "illegible",

@@ -1,6 +1,5 @@
 """Text in images: content, place, visibility and readability of everything written."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar, Literal
@@ -28,6 +27,8 @@ GRID = 5
 """Points per side of a character at which its visibility is decided."""
 NEAR_M, NEAR_SHARE = 0.003, 0.001
 """What is nearer than the text by more hides it: this, and this share of the distance."""
+MARGIN_PX = 64.0
+"""Lines this far outside the image are looked at more closely."""
 _PLACES = 4096
 """Assets whose lines are kept in memory."""
 
@@ -61,13 +62,17 @@ class Text(Strict):
         truth: sample.ImageTruth,
     ) -> sample.ImageTruth:
         """Fill in ``texts``; empty where nothing in the image is written on."""
-        found = list(_lines(scene, assets, reading, self.min_height_px))
+        found = _lines_in_view(scene, assets, reading, self.min_height_px)
         if not found:
             return replace(truth, texts=())
-        views = _project(scene, assets, reading, found)
-        texts = (_describe(scene, *pair) for pair in zip(found, views, strict=True))
-        kept = (text for text in texts if text is not None and self._is_listed(text))
-        return replace(truth, texts=tuple(kept))
+        view = _project(scene, assets, reading, found)
+        texts, start = [], 0
+        for line in found:
+            rows = slice(start, start + line.count)
+            start = rows.stop
+            if view.visible[rows].any() and np.isfinite(view.image_px[rows]).all():
+                texts.append(_describe(scene, line, view.take(rows)))
+        return replace(truth, texts=tuple(text for text in texts if self._is_listed(text)))
 
     def _is_listed(self, text: sample.TextTruth) -> bool:
         return any(
@@ -81,70 +86,117 @@ def can_write(assets: AssetLibrary, textures: tuple[str, ...]) -> bool:
     return isinstance(assets, WrittenTextures) and any(map(assets.writing, filter(None, textures)))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Written:
+    """Lines on a mesh, and their quads: of each the line's, then every word's with its letters'.
+
+    Attributes:
+        lines: Lines that are not mirrored everywhere.
+        starts: Number of the first quad of each line, and the count of all.
+        quads: Quads on triangles, [n].
+        p_mesh: Their corners in the frame of the mesh [m], [n, 4, 3].
+        mirrored: Whether each is mirrored on the outside of the surface, bool [n].
+        height_m: Height of each line's quad.
+    """
+
+    lines: tuple[SurfaceText, ...]
+    starts: NDArray[np.intp]
+    quads: SurfaceQuads
+    p_mesh: Array
+    mirrored: NDArray[np.bool_]
+    height_m: Array
+
+
 @lru_cache(maxsize=_PLACES)
-def _texts_on(
-    assets: AssetLibrary, asset_id: str, textures: tuple[str, ...]
-) -> tuple[SurfaceText, ...]:
+def _written_on(assets: AssetLibrary, asset_id: str, textures: tuple[str, ...]) -> _Written | None:
     """Lines on a mesh whose slots have these textures; empty = none, or without the mesh's UVs."""
     if not can_write(assets, textures):
-        return ()
+        return None
     assert isinstance(assets, WrittenTextures)
     mesh = assets.mesh(asset_id)
-    return tuple(
-        text
+    lines = tuple(
+        line
         for slot, texture in enumerate(textures)
         if texture
-        for text in place_writing(mesh, slot, assets.writing(texture))
+        for line in place_writing(mesh, slot, assets.writing(texture))
+        if not all(word.mirrored.all() for word in line.words)
     )
+    if not lines:
+        return None
+    parts = [[line.quad, *(word.quads for word in line.words)] for line in lines]
+    flat = [quads for part in parts for quads in part]
+    quads = SurfaceQuads(*(np.concatenate([getattr(q, name) for q in flat])
+                           for name in ("face", "weights")))  # fmt: skip
+    starts = np.cumsum([0, *(sum(len(q.face) for q in part) for part in parts)])
+    flags = [f for line in lines for f in ([line.words[0].mirrored[:1]],
+                                           [word.mirrored for word in line.words])]  # fmt: skip
+    p_mesh = quads.positions_m(mesh)
+    height_m = sides(p_mesh[starts[:-1]])[:, 1::2].max(axis=1)
+    mirrored = np.concatenate([flag for part in flags for flag in part])
+    return _Written(lines, starts, quads, p_mesh, mirrored, height_m)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Line:
-    """A line on a body of a scene; its quads: the line's, then each word's and its characters'."""
+    """A line on a body of a scene."""
 
     body: int
-    text: SurfaceText
-    quads: SurfaceQuads
-    mirrored: NDArray[np.bool_]
+    written: _Written
+    number: int
+
+    @property
+    def text(self) -> SurfaceText:
+        return self.written.lines[self.number]
+
+    @property
+    def rows(self) -> slice:
+        """Its quads."""
+        return slice(*self.written.starts[self.number : self.number + 2].tolist())
+
+    @property
+    def count(self) -> int:
+        return int(np.diff(self.written.starts[self.number : self.number + 2])[0])
 
 
-def _lines(
+def _lines_in_view(
     scene: Scene, assets: AssetLibrary, reading: SensorReading, min_height_px: float
-) -> Iterator[_Line]:
-    """Lines on bodies that are near enough, in the order of the bodies."""
-    camera = reading.camera
-    eye = np.asarray(camera.T_world_camera.translation_m)
-    focal_px = max(camera.intrinsics.fx_px, camera.intrinsics.fy_px)
+) -> list[_Line]:
+    """Lines on bodies that may be in the image and high enough, in the order of the bodies."""
+    camera, found, corners = reading.camera, [], []
+    lens = camera.intrinsics
+    T_camera_world = camera.T_world_camera.inverse()
     for number, body in enumerate(scene.bodies):
         materials = body.materials or assets.materials(body.asset)
         textures = tuple("" if m.texture_scale_m else m.texture for m in materials)
-        texts = _texts_on(assets, body.asset, textures) if any(textures) else ()
-        if not texts:
-            continue
-        low, high = (np.asarray(corner) * body.scale for corner in assets.bounds_m(body.asset))
-        centre = body.T_world_body.apply(0.5 * (low + high)[None])[0]
-        near_m = float(np.linalg.norm(centre - eye) - 0.5 * np.linalg.norm(high - low))
-        mesh = assets.mesh(body.asset)
-        for text in texts:
+        written = _written_on(assets, body.asset, textures) if any(textures) else None
+        if written is not None:
+            p_body = written.p_mesh[written.starts[:-1]] * body.scale
+            p_camera = (T_camera_world @ body.T_world_body).apply(p_body.reshape(-1, 3))
+            near_m = np.linalg.norm(p_camera, axis=1).reshape(-1, 4).min(axis=1)
             # Lenses enlarge by less than twice their focal length.
-            side_m = _sides_m(text.quad.positions_m(mesh))[:, 1::2].max() * body.scale
-            if 2.0 * focal_px * side_m >= min_height_px * near_m:
-                parts = [text.quad, *(word.quads for word in text.words)]
-                face = np.concatenate([part.face for part in parts])
-                weights = np.concatenate([part.weights for part in parts])
-                flags = [word.mirrored for word in text.words]
-                mirrored = np.concatenate([flags[0][:1], *flags])
-                yield _Line(number, text, SurfaceQuads(face, weights), mirrored)
+            high_px = 2.0 * max(lens.fx_px, lens.fy_px) * written.height_m * body.scale
+            for k in np.flatnonzero(high_px >= min_height_px * near_m).tolist():
+                found.append(_Line(number, written, k))
+                corners.append(p_camera[4 * k : 4 * k + 4])
+    if not found:
+        return []
+    uv = lens.project(np.concatenate(corners)).reshape(-1, 4, 2)
+    low, high = uv.min(axis=1), uv.max(axis=1)
+    # Bent lines reach beyond their corners; rows of rolling shutters are exposed at other times.
+    reach = high - low + MARGIN_PX
+    size = (lens.width_px, lens.height_px)
+    inside = ((high + reach > 0.0) & (low - reach < size)).all(axis=1)
+    return [found[k] for k in np.flatnonzero(inside).tolist()]
 
 
-def _sides_m(quads: Array) -> Array:
+def sides(quads: Array) -> Array:
     """Lengths of the sides of quads [..., 4, k], [..., 4]: upper, right, lower, left."""
-    return np.asarray(np.linalg.norm(np.roll(quads, -1, axis=-2) - quads, axis=-1))
+    return np.asarray(np.linalg.norm(quads[..., [1, 2, 3, 0], :] - quads, axis=-1))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _View:
-    """Quads of a line in an image.
+    """Quads in an image.
 
     Attributes:
         places_m: Corners in the world at the image's instant, [n, 4, 3].
@@ -156,45 +208,49 @@ class _View:
     image_px: Array
     visible: Array
 
+    def take(self, rows: slice) -> "_View":
+        return _View(self.places_m[rows], self.image_px[rows], self.visible[rows])
+
 
 def _project(
     scene: Scene, assets: AssetLibrary, reading: SensorReading, lines: list[_Line]
-) -> Iterator[_View]:
-    """Project lines, and find what is visible of each of their quads."""
-    counts = [4 * len(line.quads.face) for line in lines]
-    meshes = [assets.mesh(scene.bodies[line.body].asset) for line in lines]
-    pairs = list(zip(lines, meshes, strict=True))
+) -> _View:
+    """Project the quads of lines, and find what is visible of each."""
+    counts = [line.count for line in lines]
+    body = np.repeat([line.body for line in lines], counts)
+    parts = [(line.written, line.rows) for line in lines]
     points = SurfacePoints(
-        np.repeat([line.body for line in lines], counts),
-        tuple(
-            scene.bodies[line.body].asset
-            for line, n in zip(lines, counts, strict=True)
-            for _ in range(n)
-        ),
-        np.concatenate([line.quads.face.reshape(-1) for line in lines]),
-        np.concatenate([line.quads.weights.reshape(-1, 3) for line in lines]),
-        np.concatenate([line.quads.positions_m(mesh).reshape(-1, 3) for line, mesh in pairs]),
+        np.repeat(body, 4),
+        tuple(scene.bodies[k].asset for k in np.repeat(body, 4).tolist()),
+        np.concatenate([w.quads.face[rows].reshape(-1) for w, rows in parts]),
+        np.concatenate([w.quads.weights[rows].reshape(-1, 3) for w, rows in parts]),
+        np.concatenate([w.p_mesh[rows].reshape(-1, 3) for w, rows in parts]),
     )
     p_body = points.on_bodies(scene, assets)
     world = points.moving(scene, p_body)
     p_camera, image_px, _ = project_moving_points(scene, reading.camera, world, len(p_body))
-    places_m = world(np.zeros(len(p_body)))
-    ends = np.cumsum(counts)[:-1]
-    parts = (np.split(values, ends) for values in (places_m, p_camera, image_px))
-    for line, place_m, p, uv in zip(lines, *parts, strict=True):
-        quads = p.reshape(-1, 4, 3)
-        instance = scene.bodies[line.body].instance_id
-        visible = _visible_shares(reading, instance, quads, line.mirrored)
-        yield _View(place_m.reshape(-1, 4, 3), uv.reshape(-1, 4, 2), visible)
+    ids = np.array([scene.bodies[line.body].instance_id for line in lines])
+    mirrored = np.concatenate([w.mirrored[rows] for w, rows in parts])
+    visible = _visible_shares(reading, np.repeat(ids, counts), p_camera.reshape(-1, 4, 3), mirrored)
+    places_m = world(np.zeros(len(p_body))).reshape(-1, 4, 3)
+    return _View(places_m, image_px.reshape(-1, 4, 2), visible)
 
 
 def _visible_shares(
-    reading: SensorReading, instance_id: int, quads: Array, mirrored: NDArray[np.bool_]
+    reading: SensorReading,
+    instance_id: NDArray[np.integer],
+    quads: Array,
+    mirrored: NDArray[np.bool_],
 ) -> Array:
-    """Visible share of quads [n, 4, 3] in the camera frame, by the pixels of a grid of points."""
+    """Visible shares [n] of quads [n, 4, 3] in the camera frame, by the pixels of their points."""
     share = (np.arange(GRID) + 0.5) / GRID
     x, y = (axis.reshape(-1) for axis in np.meshgrid(share, share))
     bilinear = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y])
+    right, down = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
+    outward = (np.cross(right, down) * quads.sum(axis=1)).sum(axis=1) > 0.0
+    shares = np.zeros(len(quads))
+    shown = np.flatnonzero(outward & ~mirrored)
+    quads = quads[shown]
     points = np.einsum("qs,nqi->nsi", bilinear, quads, optimize=False)
     lens = reading.camera.intrinsics
     uv = lens.project(points.reshape(-1, 3)).reshape(*points.shape[:2], 2)
@@ -203,62 +259,58 @@ def _visible_shares(
     columns, rows = (np.where(inside, a, 0.0).astype(np.intp) for a in (u, v))
     away_m = np.linalg.norm(points, axis=2)
     range_m = reading.channels[Channel.RANGE][rows, columns].astype(np.float64)
-    own = reading.channels[Channel.INSTANCE][rows, columns] == instance_id
+    own = reading.channels[Channel.INSTANCE][rows, columns] == instance_id[shown, None]
     # The centre of the pixel is up to 0.7 px from the point: ranges differ by as much as they do
     # over that part of the quad.
-    right, down = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
     spread_m = np.ptp(np.linalg.norm(quads, axis=2), axis=1)
     corners_px = lens.project(quads.reshape(-1, 3)).reshape(-1, 4, 2)
-    short_px = np.nan_to_num(_sides_m(corners_px).min(axis=1), nan=1.0)
+    short_px = np.nan_to_num(sides(corners_px).min(axis=1), nan=1.0)
     slack_m = NEAR_M + spread_m / np.maximum(short_px, 0.7)
     near = np.abs(range_m - away_m) <= slack_m[:, None] + NEAR_SHARE * away_m
-    towards = (np.cross(right, down) * quads.mean(axis=1)).sum(axis=1) > 0.0
-    seen = inside & own & near & (towards & ~mirrored)[:, None]
-    return np.asarray(seen.mean(axis=1))
+    shares[shown] = (inside & own & near).mean(axis=1)
+    return shares
 
 
-def _describe(scene: Scene, line: _Line, view: _View) -> sample.TextTruth | None:
-    """A line in an image; None if the lens has no image of a part of it."""
-    if not np.isfinite(view.image_px).all():
-        return None
-    body, start, words, shares = scene.bodies[line.body], 1, [], []
+def _describe(scene: Scene, line: _Line, view: _View) -> sample.TextTruth:
+    """A line in an image."""
+    text, body, start, words, shares = line.text, scene.bodies[line.body], 1, [], []
     areas = _areas_px(view.image_px)
-    for word in line.text.words:
+    quads: list[sample.QuadPx] = [
+        (tuple(a), tuple(b), tuple(c), tuple(d))
+        for a, b, c, d in np.round(view.image_px, 2).tolist()
+    ]
+    for word in text.words:
         n = len(word.quads.face)
         rows = slice(start + 1, start + n)
-        start += n
         letters = word.text or [""] * (n - 1)
-        characters = tuple(
-            sample.CharacterTruth(letter, _quad(uv), round(float(seen), 3))
-            for letter, uv, seen in zip(
-                letters, view.image_px[rows], view.visible[rows], strict=True
-            )
-        )
-        share = _mean(view.visible[rows], areas[rows])
+        visible = view.visible[rows]
+        characters = map(sample.CharacterTruth, letters, quads[rows], np.round(visible, 3).tolist())
+        share = _mean(visible, areas[rows])
         shares.append((share, float(areas[rows].sum())))
         height_px, scale = _size(view.image_px[rows], view.places_m[rows])
         least_px = LETTERS_PX if word.text.upper() != word.text else CAPITALS_PX
-        readable = (
-            bool(word.text)
-            and height_px * scale >= least_px
-            and bool((view.visible[rows] >= READABLE_SHARE).all())
-        )
-        stroke_px = line.text.stroke * height_px * scale
+        large = bool(word.text) and height_px * scale >= least_px
         made = sample.WordTruth(
             word.text,
-            _quad(view.image_px[rows.start - 1]),
-            characters,
+            quads[start],
+            tuple(characters),
             round(share, 3),
             round(height_px, 2),
-            round(stroke_px, 2),
-            readable,
+            round(text.stroke * height_px * scale, 2),
+            large and bool((visible >= READABLE_SHARE).all()),
         )
         words.append(made)
-    visible = _mean(*np.array(shares).T)
+        start += n
     return sample.TextTruth(
-        line.text.text, line.text.language, _quad(view.image_px[0]), body.name, body.instance_id,
-        round(visible, 3), line.text.complete, tuple(words),
-    )  # fmt: skip
+        text.text,
+        text.language,
+        quads[0],
+        body.name,
+        body.instance_id,
+        round(_mean(*np.array(shares).T), 3),
+        text.complete,
+        tuple(words),
+    )
 
 
 def _size(image_px: Array, places_m: Array) -> tuple[float, float]:
@@ -266,7 +318,7 @@ def _size(image_px: Array, places_m: Array) -> tuple[float, float]:
 
     The second is the scale along the worse direction over the one along the height, at most 1.
     """
-    px, m = _sides_m(image_px), np.maximum(_sides_m(places_m), 1e-9)
+    px, m = sides(image_px), np.maximum(sides(places_m), 1e-9)
     highest = int((m[:, 1] + m[:, 3]).argmax())
     height_px = float(px[highest, 1] + px[highest, 3]) / 2.0
     up = (px[:, 1] + px[:, 3]).sum() / (m[:, 1] + m[:, 3]).sum()
@@ -283,8 +335,3 @@ def _areas_px(image_px: Array) -> Array:
 
 def _mean(values: Array, weights: Array) -> float:
     return float((values * weights).sum() / max(float(weights.sum()), 1e-9))
-
-
-def _quad(uv: Array) -> sample.QuadPx:
-    a, b, c, d = ((round(float(u), 2), round(float(v), 2)) for u, v in uv)
-    return (a, b, c, d)
