@@ -1,4 +1,4 @@
-"""Evaluations of lanes, maps and scene flow, most of them in no registry.
+"""Evaluations of lanes, maps, scene flow and text, most of them in no registry.
 
 ::
 
@@ -30,11 +30,16 @@ SOURCES = {
     "OpenLane": ("https://github.com/OpenDriveLab/OpenLane",
                  "8a0ce6b0057278729f4753a57be38c12929d7ad9"),
     "MapTR": ("https://github.com/hustvl/MapTR", "a6872d8d9670bde17b4b01560f1221f88b443d55"),
+    "coco-text": ("https://github.com/andreasveit/coco-text",
+                  "38f8490fa7281872f588ae693f551cedbe2c0129"),
+    "DB": ("https://github.com/MhLiao/DB", "65ca77a0bcfbd7114b916cf8a1e9ca85114286ce"),
 }  # fmt: skip
 PARTS = {
     "SCNN": "tools/lane_evaluation",
     "OpenLane": "eval/LANE_evaluation",
     "MapTR": "projects/mmdet3d_plugin/datasets/map_utils",
+    "coco-text": ".",
+    "DB": "concern/icdar2015_eval/detection",
 }
 """Folder of the evaluation in each repository."""
 LIBRARIES = ("core", "imgproc", "imgcodecs", "highgui")
@@ -70,12 +75,13 @@ def clone(folder: Path, url: str, commit: str, part: str) -> None:
 
 
 def make_data(scratch: Path) -> Path:
-    """A data set of lanes.yaml, all of it in the split ``train``, with scene flow of a scanner."""
+    """A data set of lanes.yaml, all of it in the split ``train``; next to it flow and text."""
     import gen_data
 
     rig = Path(__file__).parent / "rig.yaml"
     flow = ["exporters=[{type: lidar_flow, layouts: [av2]}]", "annotations=[boxes3d]"]
     gen_data.generate(rig, 3, out=scratch / "rig", workers=0, overrides=flow)
+    gen_data.generate("written_text.yaml", 5, out=scratch / "text", workers=0)
     gen_data.generate(
         "lanes.yaml", SAMPLES, out=scratch / "data", workers=0,
         overrides=["splits={train: 1}", f"steps_per_scene={SAMPLES}"],
@@ -188,6 +194,44 @@ def by_maptr(code: Path, root: Path, out: Path, moved: float) -> float:
     return float(mean)
 
 
+def by_icdar(code: Path, root: Path, out: Path, moved: float) -> float:
+    """Harmonic mean of ICDAR 2015's evaluation, in the version for Shapely of the detector DB."""
+    del out
+    sys.path.insert(0, str(code))
+    from iou import DetectionIoUEvaluator
+
+    judge, results = DetectionIoUEvaluator(), []
+    for path in (root.parent / "text/scene_text/icdar2015").glob("*/gt/*.txt"):
+        rows = [row.split(",", 8) for row in path.read_text("utf-8-sig").splitlines()]
+        corners = [np.array(row[:8], float).reshape(4, 2) for row in rows]
+        words = [
+            {"points": points, "text": row[8], "ignore": row[8] == "###"}
+            for row, points in zip(rows, corners, strict=True)
+        ]
+        found = [{**word, "points": word["points"] + moved * MOVED_PX} for word in words]
+        results.append(judge.evaluate_image(words, found))
+    return float(judge.combine_results(results)["hmean"])
+
+
+def by_coco_text(code: Path, root: Path, out: Path, moved: float) -> float:
+    """F-score of COCO-Text's evaluation: boxes with half their area in common."""
+    sys.modules["editdistance"] = unittest.mock.MagicMock()  # of transcriptions, which it compares
+    sys.path.insert(0, str(code))
+    from coco_evaluation import getDetections
+    from coco_text import COCO_Text
+
+    truth = root.parent / "text/scene_text/coco_text/cocotext.v2.json"
+    content = json.loads(truth.read_text())
+    for word in content["anns"].values():
+        word["bbox"] = [v + moved * MOVED_PX * (k < 2) for k, v in enumerate(word["bbox"])]
+    out.mkdir(parents=True)
+    (out / "found.json").write_text(json.dumps(content))
+    given, found = COCO_Text(str(truth)), COCO_Text(str(out / "found.json"))
+    counts = {k: len(v) for k, v in getDetections(given, found, imgIds=[]).items()}
+    wrong = counts["false_positives"] + counts["false_negatives"]
+    return 2 * counts["true_positives"] / (2 * counts["true_positives"] + wrong)
+
+
 class TreeOfGeometries:
     """Shapely's tree of boxes that answers with geometries instead of their numbers."""
 
@@ -271,6 +315,8 @@ EVALUATIONS = {
     "OpenLane, space": (by_openlane_3d, "OpenLane"),
     "MapTR": (by_maptr, "MapTR"),
     "Argoverse 2, flow": (by_argoverse_flow, ""),
+    "ICDAR 2015": (by_icdar, "DB"),
+    "COCO-Text": (by_coco_text, "coco-text"),
 }
 
 if __name__ == "__main__":
