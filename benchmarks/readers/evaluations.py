@@ -1,4 +1,4 @@
-"""Evaluations of lanes, maps and scene flow, most of them in no registry.
+"""Evaluations of lanes, maps, voxels, scene flow and text, most of them in no registry.
 
 ::
 
@@ -12,6 +12,7 @@ the headers of OpenCV (``apt-get install libopencv-dev``), and ``pip install ort
 import argparse
 import json
 import re
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -24,17 +25,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 SOURCES = {
     "SCNN": ("https://github.com/XingangPan/SCNN", "428d5e007d5b53e3acfa40dc19fdfa5141d079a3"),
     "OpenLane": ("https://github.com/OpenDriveLab/OpenLane",
                  "8a0ce6b0057278729f4753a57be38c12929d7ad9"),
     "MapTR": ("https://github.com/hustvl/MapTR", "a6872d8d9670bde17b4b01560f1221f88b443d55"),
+    "coco-text": ("https://github.com/andreasveit/coco-text",
+                  "38f8490fa7281872f588ae693f551cedbe2c0129"),
+    "semantic-kitti-api": ("https://github.com/PRBonn/semantic-kitti-api",
+                           "a9c749e8124b2243b6eef1b8bcf971a9f1173a2d"),
+    "DB": ("https://github.com/MhLiao/DB", "65ca77a0bcfbd7114b916cf8a1e9ca85114286ce"),
 }  # fmt: skip
 PARTS = {
     "SCNN": "tools/lane_evaluation",
     "OpenLane": "eval/LANE_evaluation",
     "MapTR": "projects/mmdet3d_plugin/datasets/map_utils",
+    "coco-text": ".",
+    "semantic-kitti-api": ".",
+    "DB": "concern/icdar2015_eval/detection",
 }
 """Folder of the evaluation in each repository."""
 LIBRARIES = ("core", "imgproc", "imgcodecs", "highgui")
@@ -57,7 +67,7 @@ def main() -> int:
             code = (given.repositories / source / PARTS.get(source, "")).resolve()
             with redirect_stdout(StringIO()):
                 scores = [evaluate(code, root, Path(scratch) / name / str(k), k) for k in (0, 1)]
-            print(f"{name:20} truth {scores[0]:.4f}, moved truth {scores[1]:.4f}", flush=True)
+            print(f"{name:22} truth {scores[0]:.4f}, moved truth {scores[1]:.4f}", flush=True)
             wrong |= scores[0] != 1.0 or scores[1] > 0.5
     return int(wrong)
 
@@ -70,12 +80,17 @@ def clone(folder: Path, url: str, commit: str, part: str) -> None:
 
 
 def make_data(scratch: Path) -> Path:
-    """A data set of lanes.yaml, all of it in the split ``train``, with scene flow of a scanner."""
+    """A data set of lanes.yaml, all in the split ``train``; next to it flow, voxels and text."""
     import gen_data
 
     rig = Path(__file__).parent / "rig.yaml"
     flow = ["exporters=[{type: lidar_flow, layouts: [av2]}]", "annotations=[boxes3d]"]
     gen_data.generate(rig, 3, out=scratch / "rig", workers=0, overrides=flow)
+    box = "frame: velodyne, size_m: [51.2, 51.2, 6.4], voxel_m: 0.2, from_m: [0, -25.6, -2]"
+    completion = ["exporters=[{type: occupancy, layouts: [semantickitti]}]",
+                  f"annotations=[{{type: occupancy, {box}}}]"]  # fmt: skip
+    gen_data.generate(rig, 3, out=scratch / "voxels", workers=0, overrides=completion)
+    gen_data.generate("written_text.yaml", 5, out=scratch / "text", workers=0)
     gen_data.generate(
         "lanes.yaml", SAMPLES, out=scratch / "data", workers=0,
         overrides=["splits={train: 1}", f"steps_per_scene={SAMPLES}"],
@@ -188,6 +203,72 @@ def by_maptr(code: Path, root: Path, out: Path, moved: float) -> float:
     return float(mean)
 
 
+def by_icdar(code: Path, root: Path, out: Path, moved: float) -> float:
+    """Harmonic mean of ICDAR 2015's evaluation, in the version for Shapely of the detector DB."""
+    del out
+    sys.path.insert(0, str(code))
+    from iou import DetectionIoUEvaluator
+
+    judge, results = DetectionIoUEvaluator(), []
+    for path in (root.parent / "text/scene_text/icdar2015").glob("*/gt/*.txt"):
+        rows = [row.split(",", 8) for row in path.read_text("utf-8-sig").splitlines()]
+        corners = [np.array(row[:8], float).reshape(4, 2) for row in rows]
+        words = [
+            {"points": points, "text": row[8], "ignore": row[8] == "###"}
+            for row, points in zip(rows, corners, strict=True)
+        ]
+        found = [{**word, "points": word["points"] + moved * MOVED_PX} for word in words]
+        results.append(judge.evaluate_image(words, found))
+    return float(judge.combine_results(results)["hmean"])
+
+
+def by_coco_text(code: Path, root: Path, out: Path, moved: float) -> float:
+    """F-score of COCO-Text's evaluation: boxes with half their area in common."""
+    sys.modules["editdistance"] = unittest.mock.MagicMock()  # of transcriptions, which it compares
+    sys.path.insert(0, str(code))
+    from coco_evaluation import getDetections
+    from coco_text import COCO_Text
+
+    truth = root.parent / "text/scene_text/coco_text/cocotext.v2.json"
+    content = json.loads(truth.read_text())
+    for word in content["anns"].values():
+        word["bbox"] = [v + moved * MOVED_PX * (k < 2) for k, v in enumerate(word["bbox"])]
+    out.mkdir(parents=True)
+    (out / "found.json").write_text(json.dumps(content))
+    given, found = COCO_Text(str(truth)), COCO_Text(str(out / "found.json"))
+    counts = {k: len(v) for k, v in getDetections(given, found, imgIds=[]).items()}
+    wrong = counts["false_positives"] + counts["false_negatives"]
+    return 2 * counts["true_positives"] / (2 * counts["true_positives"] + wrong)
+
+
+def by_semantic_kitti_api(code: Path, root: Path, out: Path, moved: float) -> float:
+    """Mean IoU of SemanticKITTI's scene completion, over the classes that are there."""
+    truth = root.parent / "voxels/occupancy/semantickitti"
+    config = yaml.safe_load((code / "config/semantic-kitti.yaml").read_text())
+    config["split"]["valid"] = sorted(int(folder.name) for folder in truth.glob("sequences/*"))
+    out.mkdir(parents=True)
+    (out / "config.yaml").write_text(yaml.safe_dump(config))
+    seen: set[int] = set()
+    for path in truth.glob("sequences/*/voxels/*.label"):
+        labels = np.fromfile(path, np.uint16)
+        judged = ~np.unpackbits(np.fromfile(path.with_suffix(".invalid"), np.uint8)).astype(bool)
+        seen |= {config["learning_map"][k] for k in np.unique(labels[judged]).tolist()}
+        target = out / path.relative_to(truth).parent.with_name("predictions") / path.name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        # Classes that it does not judge must not be predicted.
+        named = np.isin(labels, [k for k, judged in config["learning_map"].items() if judged])
+        found = np.where(named, labels, 0).astype(np.uint16)
+        np.roll(found, round(moved * len(found) / 2)).tofile(target)
+    folders = ["-d", str(truth), "-p", str(out), "--output", str(out)]
+    sys.argv = ["evaluate_completion", *folders, "-dc", str(out / "config.yaml")]
+    sys.path.insert(0, str(code))
+    runpy.run_path(str(code / "evaluate_completion.py"), run_name="__main__")
+    scores = yaml.safe_load((out / "scores.txt").read_text())
+    names = (config["labels"][config["learning_map_inv"][k]] for k in sorted(seen - {0}))
+    # It adds a small number to each union.
+    return round(float(np.mean([scores[f"iou_{name}"] for name in names])), 6)
+
+
 class TreeOfGeometries:
     """Shapely's tree of boxes that answers with geometries instead of their numbers."""
 
@@ -271,6 +352,9 @@ EVALUATIONS = {
     "OpenLane, space": (by_openlane_3d, "OpenLane"),
     "MapTR": (by_maptr, "MapTR"),
     "Argoverse 2, flow": (by_argoverse_flow, ""),
+    "SemanticKITTI, voxels": (by_semantic_kitti_api, "semantic-kitti-api"),
+    "ICDAR 2015": (by_icdar, "DB"),
+    "COCO-Text": (by_coco_text, "coco-text"),
 }
 
 if __name__ == "__main__":

@@ -235,6 +235,6 @@ WITHOUT_READER = {
     "map_vectors": "its evaluation is in no registry: benchmarks.readers.evaluations",
     "opendrive": "our reader; ASAM's checker requires packages of its own (docs/maps.md)",
     "openlane": "its evaluation is in no registry: benchmarks.readers.evaluations",
-    "scene_text": "COCO-Text's interface and ICDAR's evaluation are in no registry",
+    "scene_text": "its evaluations are in no registry: benchmarks.readers.evaluations",
 }
 """Formats without a row, with the reason; tests/exporters compares them with their formulas."""
