@@ -39,6 +39,27 @@ def surface_voxels(grid: Occupancy, scene: Scene) -> tuple[se3.Array, NDArray[np
     return grid.centers_m(np.argwhere(shown)), voxel_colors(grid, scene)[shown]
 
 
+def view_from_above(grid: Occupancy, scene: Scene) -> Image:
+    """Draw a pixel per column of voxels, uint8 [x, y, 3]: X upwards, Y to the left.
+
+    It has the colour of the highest surface that a sensor observes below air that it observes:
+    below ceilings, too. Elsewhere it is dark: the highest surface; black without any.
+    """
+    surface = grid.state == VOXEL_STATES.index("surface")
+    # Without a sensor, none is dark.
+    seen = np.logical_or.reduce([*grid.observed.values()] or [np.ones(surface.shape, np.bool_)])
+    air = seen & (grid.state == VOXEL_STATES.index("free"))
+    above = np.concatenate([air[..., 1:], np.ones_like(air[..., :1])], axis=2)
+    chosen = surface & seen & above
+    bright = chosen.any(axis=2)
+    chosen[~bright] = surface[~bright]
+    top = chosen.shape[2] - 1 - chosen[..., ::-1].argmax(axis=2)
+    x, y = np.indices(top.shape)
+    colors = voxel_colors(grid, scene)[x, y, top] * np.where(bright, 1.0, UNSEEN)[..., None]
+    colors[~chosen.any(axis=2)] = 0
+    return np.ascontiguousarray(colors.astype(np.uint8)[::-1, ::-1])
+
+
 def oblique_view(grid: Occupancy, scene: Scene) -> Image:
     """Draw voxels with a surface from behind and above, uint8 [h, w, 3]; unobserved ones dark."""
     image = empty_view(ASPECT)

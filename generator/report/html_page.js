@@ -509,6 +509,7 @@ function browser() {
   const canvas = el("canvas", { tabindex: 0, role: "img", "aria-label": "Image with its labels" });
   const message = el("p", { hidden: "" }, "No image has an object that passes the filters.");
   const list = el("div", { class: "card objects" });
+  const above = el("figure", { class: "card above", hidden: "" });
   const strip = el("div", { class: "strip" });
   const title = el("span", { class: "quiet", id: "shown" });
   const names = () => (state.set.categories || []).map((row) => row.name);
@@ -536,6 +537,7 @@ function browser() {
     if (!image) {
       title.textContent = "0 images";
       list.replaceChildren();
+      above.hidden = true;
       return;
     }
     const depth = state.layers.has("depth") && image.pictures.depth;
@@ -635,6 +637,20 @@ function browser() {
       { picked: (row) => { state.picked = shown[row].k; draw(); } }));
   }
 
+  function showOccupancy() {
+    const { occupancy, pictures } = visible()[state.position] || { pictures: {} };
+    above.hidden = !pictures.occupancy;
+    if (above.hidden) return;
+    const { shape, sensors } = occupancy;
+    const seen = occupancy.observed_surface / Math.max(1, occupancy.surface);
+    const text = `Occupancy from above, X upwards: ${shape.join(" × ")} voxels of ${occupancy.voxel_m} m. `
+      + `${number(occupancy.surface)} with a surface, ${number(occupancy.interior)} within objects and the ground, `
+      + `${number(occupancy.free)} free.`
+      + (sensors.length ? ` ${percent(seen)} of the surfaces observed by ${sensors.join(", ")}; others are dark.` : "");
+    above.replaceChildren(el("img", { src: pictures.occupancy, alt: "Occupancy from above", width: shape[1],
+      height: shape[0] }), el("figcaption", { class: "quiet" }, text));
+  }
+
   function listStrip() {
     const images = visible();
     strip.replaceChildren(...images.map((image, k) => el("button", {
@@ -653,6 +669,7 @@ function browser() {
       strip.scrollLeft = current.offsetLeft - strip.offsetLeft - strip.clientWidth / 2 + current.clientWidth / 2;
     }
     listObjects();
+    showOccupancy();
     draw();
   }
 
@@ -714,7 +731,8 @@ function browser() {
     el("div", { class: "bar" },
       el("button", { "aria-label": "Previous image", click: () => go(state.position - 1) }, "←"),
       el("button", { "aria-label": "Next image", click: () => go(state.position + 1) }, "→"), title),
-    el("div", { class: "viewer" }, el("div", {}, el("div", { class: "stage" }, canvas, message), strip), list));
+    el("div", { class: "viewer" }, el("div", {}, el("div", { class: "stage" }, canvas, message), strip),
+      el("div", {}, list, above)));
   // The canvas has no width before it is in the page.
   requestAnimationFrame(() => choose(known[0]));
   return whole;

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from gen_data.core import boxes, capture, skeletons
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from gen_data.preview import overlay, palette
+from gen_data.preview import overlay, palette, voxel_view
+from gen_data.report.occupancy_statistics import grid_facts
 from gen_data.runner.stored import LabelledImages, StoredSamples
 
 WIDTH_PX = 640
@@ -40,8 +41,9 @@ class BrowserImage:
 
     Attributes:
         facts: Index, camera, size and labels.
-        pictures: ``rgb``, and ``depth`` and ``masks`` if the data set has them. A pixel of
-            ``masks`` is the number of its object in ``facts["objects"]``, from 1; 0 = none.
+        pictures: ``rgb``, and ``depth``, ``masks`` and ``occupancy`` if the data set has them. A
+            pixel of ``masks`` is the number of its object in ``facts["objects"]``, from 1; 0 =
+            none. ``occupancy`` is the sample's, from above, with X upwards.
     """
 
     facts: dict[str, Any]
@@ -125,6 +127,11 @@ def _browser_image(sample: LabelledImages, camera: str) -> BrowserImage:
     points = _laser_points(sample, truth)
     if points:
         facts["points"] = points
+    grid = None if sample.frame is None else sample.frame.occupancy
+    if grid is not None:
+        facts["occupancy"] = grid_facts(grid)
+        above = voxel_view.view_from_above(grid, sample.scene)
+        pictures["occupancy"] = _png(_shrink(above[..., ::-1], WIDTH_PX, cv2.INTER_NEAREST))
     return BrowserImage(facts, pictures)
 
 
@@ -253,6 +260,7 @@ def _jpeg(bgr: NDArray[np.uint8], quality: int) -> str:
     return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode()
 
 
-def _png(grey: NDArray[np.uint8]) -> str:
-    _, data = cv2.imencode(".png", grey)
+def _png(pixels: NDArray[np.uint8]) -> str:
+    """``data:`` URL of a grey or BGR image."""
+    _, data = cv2.imencode(".png", pixels)
     return "data:image/png;base64," + base64.b64encode(data.tobytes()).decode()
