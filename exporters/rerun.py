@@ -220,8 +220,8 @@ def _chunks(
     for rig in sorted({name for row in rows for name in row["rigs"]}):
         mine = [{**row, "pose": row["rigs"][rig]} for row in rows if rig in row["rigs"]]
         yield _poses(info, f"world/rigs/{rig}", mine)
-    for path, mine, columns in rerun_labels.frame_entities(rows):
-        yield _chunk(info, path, mine, columns)
+    for path, found, columns in rerun_labels.frame_entities(rows):
+        yield _chunk(info, path, found, columns)
     for name in info.cameras:
         if images := _readings(rows, "cameras", name):
             yield from _camera_chunks(info, name, images, skeletons)

@@ -176,7 +176,7 @@ def channel_entities(
     ]
     if channel is Channel.DEPTH_LAYERS:
         root = f"world/cameras/{camera}/image/{channel.value}"
-        for number, layers in _layers(images):
+        for suffix, layers in _layers(images):
             units = [depth_units(layer_m, depth_scale_m) for layer_m in layers]
             blobs = [encode_png(pixels, RowFilter.SUB, LEVEL) for pixels in units]
             columns = rr.EncodedDepthImage.columns(
@@ -184,19 +184,19 @@ def channel_entities(
                 media_type=["image/png"] * len(blobs),
                 meter=[1.0 / depth_scale_m] * len(blobs),
             )
-            yield f"{root}/{number}", rows, columns
+            yield f"{root}{suffix}", rows, columns
         return
     root = f"channels/{camera}/{channel.value}"
-    for number, layers in _layers(images) if channel in LAYERS else [(None, images)]:
+    for suffix, layers in _layers(images) if channel in LAYERS else [("", images)]:
         blobs = [encode_png(color_ids(ids), RowFilter.UP, LEVEL) for ids in layers]
         columns = rr.EncodedImage.columns(
             blob=[np.frombuffer(blob, np.uint8) for blob in blobs],
             media_type=["image/png"] * len(blobs),
         )
-        yield root if number is None else f"{root}/{number}", rows, columns
+        yield f"{root}{suffix}", rows, columns
 
 
-def _layers(images: Sequence[NDArray[Any]]) -> Iterator[tuple[int, list[NDArray[Any]]]]:
-    """Number of each layer, and the images of it, [h, w]; images have equally many layers."""
+def _layers(images: Sequence[NDArray[Any]]) -> Iterator[tuple[str, list[NDArray[Any]]]]:
+    """Ending of the entity of each layer, and its images, [h, w]; all have as many layers."""
     for number in range(images[0].shape[-1]):
-        yield number, [np.ascontiguousarray(image[..., number]) for image in images]
+        yield f"/{number}", [np.ascontiguousarray(image[..., number]) for image in images]
