@@ -16,11 +16,18 @@ after the other. Times are true, also of sensors with a wrong clock. Entities:
                                      ``category``, ``boxes``, and ``keypoints/<instance id>``
 ``world/lidars/<name>``              pose, and points in its frame with classes
 ``faults/<sensor>``                  true faults of a reading, as JSON; empty without any
+``world/lanes``                      borders of lanes, in each image as ``image/lanes``
+``world/tracks``                     tracked points, in each image as ``image/tracks``
+``world/occupancy``                  pose; ``voxels``: boxes of the voxels with a surface
+``.../image/depth_layers/<k>``       layers of depth, as PNG files
+``channels/<name>/...``              coloured: ``instance_layers/<k>``, ``material_layers/<k>`` and
+                                     ``seen_in_mirror``
 ===================================  ==============================================================
 
 Class ids are category ids, 0 is the background. Quaternions are x y z w, boxes have half sizes, and
-principal points have pixel centres at i + 0.5. Ignored objects have no boxes and keypoints. Other
-channels and devices are not in it; ``gen-data preview`` shows meshes.
+principal points have pixel centres at i + 0.5. Ignored objects have no boxes and keypoints. Lanes,
+tracks, occupancy, layers and mirrors are in it where the data set has them, in the colours of
+``gen-data preview``. Other channels and devices are not in it; ``gen-data preview`` shows meshes.
 
 Reference: https://rerun.io/docs/reference/types.
 """
@@ -39,7 +46,14 @@ from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.core.skeletons import Skeleton, find_skeleton
-from gen_data.exporters import base, image_files, label_colors, point_cloud_io, rrd_container
+from gen_data.exporters import (
+    base,
+    image_files,
+    label_colors,
+    point_cloud_io,
+    rerun_labels,
+    rrd_container,
+)
 from gen_data.exporters.conventions import READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 
@@ -104,6 +118,7 @@ class Rerun(base.ExporterBase):
 
 def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
     begins_s = (sample.index - sample.step_index) * info.step_s
+    tracks = None if sample.frame is None else sample.frame.tracks
     seen = {
         item.instance.instance_id: item
         for truth in sample.truth.values()
@@ -122,6 +137,9 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
             name: {
                 "time_s": round(begins_s + sample.capture.readings[name].time_s, 9),
                 **_image_row(sample, name),
+                **rerun_labels.image_row(
+                    sample.truth[name], None if tracks is None else tracks.sensors.get(name)
+                ),
             }
             for name in info.cameras
             if name in sample.truth
@@ -133,6 +151,7 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
             }
             for name, cloud in sorted(sample.capture.clouds.items())
         },
+        **rerun_labels.frame_row(sample.frame, sample.scene),
     }
 
 
@@ -206,6 +225,8 @@ def _chunks(
     for rig in sorted({name for row in rows for name in row["rigs"]}):
         mine = [{**row, "pose": row["rigs"][rig]} for row in rows if rig in row["rigs"]]
         yield _poses(info, f"world/rigs/{rig}", mine)
+    for path, found, columns in rerun_labels.frame_entities(rows):
+        yield _chunk(info, path, found, columns)
     for name in info.cameras:
         if images := _readings(rows, "cameras", name):
             yield from _camera_chunks(info, name, images, skeletons)
@@ -277,6 +298,12 @@ def _camera_chunks(
         )
         yield _chunk(info, f"{path}/image", rows, pinhole)
     for channel in info.media[name]:
+        if channel is capture.Channel.DEPTH_LAYERS or channel in rerun_labels.COLORED:
+            files = _files(info, name, channel, rows)
+            for entity, mine, columns in rerun_labels.channel_entities(
+                name, channel, rows, files, info.depth_scale_m
+            ):
+                yield _chunk(info, entity, mine, columns)
         columns = _channel_columns(info, name, channel, rows)
         if columns is not None:
             yield _chunk(info, f"{path}/image/{channel.value}", rows, columns)
@@ -290,6 +317,8 @@ def _camera_chunks(
             class_ids=numbers[:, 0].astype(np.uint16),
         )
         yield _chunk(info, f"{path}/image/boxes", rows, boxes.partition(counts))
+    for entity, mine, columns in rerun_labels.image_entities(f"{path}/image", rows):
+        yield _chunk(info, entity, mine, columns)
     for instance in sorted({key for row in rows for key in row["keypoints"]}, key=int):
         columns = _keypoint_columns([row["keypoints"].get(instance) for row in rows], skeletons)
         yield _chunk(info, f"{path}/image/keypoints/{instance}", rows, columns)
@@ -303,7 +332,7 @@ def _channel_columns(
     from rerun.components import ImageFormat
     from rerun.encodings import ChannelDatatype
 
-    paths = [info.media_path(row["shard"], name, channel, row["index"]) for row in rows]
+    paths = _files(info, name, channel, rows)
     types = [f"image/{info.encoding(name, channel).format}"] * len(paths)
     if channel is capture.Channel.RGB:
         return rr.EncodedImage.columns(blob=_blobs(paths), media_type=types)
@@ -319,6 +348,12 @@ def _channel_columns(
             ],
         )
     return None
+
+
+def _files(
+    info: DatasetInfo, camera: str, channel: capture.Channel, rows: Sequence[Row]
+) -> list[Path]:
+    return [info.media_path(row["shard"], camera, channel, row["index"]) for row in rows]
 
 
 def _read_ids(path: Path) -> NDArray[np.uint16]:

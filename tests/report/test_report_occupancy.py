@@ -12,8 +12,7 @@ from gen_data.core.asset_types import SURFACES
 from gen_data.core.sample import Occupancy
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import IDENTITY
-from gen_data.preview.palette import id_color
-from gen_data.preview.sensor_views import COLORS, UNLABELLED
+from gen_data.exporters.label_colors import SURFACE_COLORS, UNLABELLED, id_color
 from gen_data.preview.voxel_view import UNSEEN, view_from_above
 from gen_data.report.report_data import describe_dataset, without_pictures
 from tests.report.handmade import make_image, make_object, write_dataset
@@ -50,7 +49,7 @@ def test_the_view_from_above_looks_below_roofs_and_is_dark_where_no_sensor_sees(
     grid = make_grid()
     scene = Scene("street", instances=(make_object(CAR, "car").instance,))
     view = view_from_above(grid, scene)
-    road, car = COLORS["asphalt"], id_color(1)
+    road, car = SURFACE_COLORS["asphalt"], id_color(1)
 
     dark = [shaded(road, UNSEEN)] * 3
     # The camera sees the roof, above which the box ends.
@@ -70,7 +69,7 @@ def test_a_ceiling_hides_the_floor_only_where_no_sensor_sees_it() -> None:
         {"color": seen},
     )  # fmt: skip
     view = view_from_above(grid, Scene("room"))
-    assert view.tolist() == [[shaded(UNLABELLED, UNSEEN), list(COLORS["asphalt"])]]
+    assert view.tolist() == [[shaded(UNLABELLED, UNSEEN), list(SURFACE_COLORS["asphalt"])]]
 
 
 def test_an_unobserved_grid_without_sensors_is_not_dark_and_empty_columns_are_black() -> None:
