@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 
 from gen_data.core.sample import TextTruth, WordTruth
+from gen_data.exporters.label_colors import Rgb
 from gen_data.preview.overlay import Image
-from gen_data.preview.palette import Rgb
 
 READABLE: Rgb = (60, 255, 60)
 UNREADABLE: Rgb = (255, 140, 0)
