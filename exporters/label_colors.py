@@ -15,7 +15,7 @@ GOLDEN_RATIO_CONJUGATE = 0.618033988749895
 """Step around the hue circle that keeps the hues of successive ids far apart."""
 UNLABELLED: Rgb = (120, 120, 120)
 SURFACE_COLORS: Mapping[str, Sequence[int]] = load_data(__package__, "surface_colors")
-"""SRGB colours of what has no category, by surface."""
+"""SRGB colours of objects and ground without a category, by surface."""
 
 
 def id_color(number: int) -> Rgb:

@@ -1,7 +1,7 @@
 """Lanes, tracked points, voxels, layers and mirrors in recordings of the exporter ``rerun``.
 
 They have the entities and colours of ``gen-data preview``. Rows are plain values, in the fragments
-of shards; columns are those of an entity, for the rows that have it.
+of shards; columns hold one entity, for the rows that have it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
