@@ -7,8 +7,9 @@
     coco_text/images/<split>/12.png           layout ``coco_text``: links to the photographs
     coco_text/cocotext.v2.json                ``imgs``, ``anns`` and ``imgToAnns`` by id, ``cats``
 
-Words without a visible character are left out. The region of a word is the quad of the word; where
-some of its characters are hidden or outside the image, it covers the others, and is not readable.
+Words without a visible character and two-dimensional codes are left out. The region of a word is
+the quad of the word; where some of its characters are hidden or outside the image, it covers the
+others, and is not readable.
 
 * **icdar2015**: UTF-8 with a byte order mark; whole pixels along the edges of pixels, clockwise
   from the top left of the upright word; ``###`` stands for words that are not readable.
@@ -115,15 +116,17 @@ class SceneText(base.ExporterBase):
 
 
 def seen_words(texts: Iterable[TextTruth]) -> Iterator[tuple[TextTruth, WordTruth]]:
-    """Words with a visible character, each with its line."""
+    """Words with a visible character, each with its line; codes are left out."""
     for text in texts:
-        yield from ((text, word) for word in text.words if word.visible_fraction > 0.0)
+        words = () if text.kind == "code" else text.words
+        yield from ((text, word) for word in words if word.visible_fraction > 0.0)
 
 
 def _facts(text: TextTruth, word: WordTruth) -> dict[str, Any]:
     return {
         "text": word.text,
         "language": text.language,
+        "kind": text.kind,
         "quad": region(word).tolist(),
         "outline": outline(word).tolist(),
         "readable": word.readable,
@@ -203,7 +206,7 @@ def _add_image(coco: dict[str, Any], row: dict[str, Any], file: str) -> None:
             "mask": points.reshape(-1).tolist(),
             "polygon": [coordinate for corner in word["quad"] for coordinate in corner],
             "area": round(abs(signed_area(points)), 2),
-            "class": "machine printed" if word["text"] else "handwritten",
+            "class": "handwritten" if word["kind"] == "scribble" else "machine printed",
             "legibility": "legible" if word["readable"] else "illegible",
             "language": LANGUAGES.get(word["language"], "not english"),
             "utf8_string": word["text"] if word["readable"] else "",

@@ -11,18 +11,25 @@ from pydantic import Field
 from gen_data.config.base_model import Strict
 from gen_data.core import sample
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.interfaces import AssetLibrary, WrittenTextures
+from gen_data.core.interfaces import AssetLibrary, WrittenAssets
 from gen_data.core.rolling_shutter_projection import project_moving_points
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 from gen_data.core.surface_points import SurfacePoints
-from gen_data.core.surface_text import SurfaceQuads, SurfaceText, place_writing
+from gen_data.core.surface_text import (
+    SurfaceQuads,
+    SurfaceText,
+    place_on_mesh,
+    place_writing,
+)
 
 CAPITALS_PX, LETTERS_PX = 7.0, 9.0
 """Least height of readable characters: ISO 9241-303 requires 5 by 7 dots for digits and capitals
 alone, and 7 by 9 dots where letters of both cases are read."""
 READABLE_SHARE = 0.5
 """Least visible share of every character of a readable word (assumed)."""
+MODULE_PX = 2.0
+"""Least width of a module of a readable code: two samples per module, by the sampling theorem."""
 GRID = 5
 """Points per side of a character at which its visibility is decided."""
 NEAR_M, NEAR_SHARE = 0.003, 0.001
@@ -34,7 +41,7 @@ _PLACES = 4096
 
 
 class Text(Strict):
-    """Lines of text in the image: number plates, signs, labels, covers, posters, screens.
+    """Lines of text in the image: number plates, signs, labels, covers, posters, words on roads.
 
     For every line, word and character: the quad of its ink, projected through the lens, also behind
     what hides it; content, language, visibility, and size in pixels. Lines without a visible
@@ -43,8 +50,9 @@ class Text(Strict):
 
     A word is readable if its highest character is at least 9 px high, or 7 px if it has no small
     letters, in the direction in which the image shortens it most (ISO 9241-303: a matrix of 7 by 9
-    dots, and of 5 by 7 for digits and capitals alone), and half of each character is visible.
-    Contrast, blur and noise do not count.
+    dots, and of 5 by 7 for digits and capitals alone), and half of each character is visible. A
+    code is readable if its modules are 2 px wide and all of it is visible. Contrast, blur and noise
+    do not count.
 
     Attributes:
         min_height_px: Least height of the highest character of a line.
@@ -66,12 +74,13 @@ class Text(Strict):
         if not found:
             return replace(truth, texts=())
         view = _project(scene, assets, reading, found)
-        texts, start = [], 0
+        lens = reading.camera.intrinsics
+        texts, start, size = [], 0, (lens.width_px, lens.height_px)
         for line in found:
             rows = slice(start, start + line.count)
             start = rows.stop
             if view.visible[rows].any() and np.isfinite(view.image_px[rows]).all():
-                texts.append(_describe(scene, line, view.take(rows)))
+                texts.append(_describe(scene, line, view.take(rows), size))
         return replace(truth, texts=tuple(text for text in texts if self._is_listed(text)))
 
     def _is_listed(self, text: sample.TextTruth) -> bool:
@@ -81,9 +90,9 @@ class Text(Strict):
         )
 
 
-def can_write(assets: AssetLibrary, textures: tuple[str, ...]) -> bool:
-    """Whether any of some textures has writing."""
-    return isinstance(assets, WrittenTextures) and any(map(assets.writing, filter(None, textures)))
+def can_write(assets: AssetLibrary, ids: tuple[str, ...]) -> bool:
+    """Whether any of some textures and objects has writing; empty ids have none."""
+    return isinstance(assets, WrittenAssets) and any(map(assets.writing, filter(None, ids)))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -93,8 +102,7 @@ class _Written:
     Attributes:
         lines: Lines that are not mirrored everywhere.
         starts: Number of the first quad of each line, and the count of all.
-        quads: Quads on triangles, [n].
-        p_mesh: Their corners in the frame of the mesh [m], [n, 4, 3].
+        quads: Quads on the mesh, [n].
         mirrored: Whether each is mirrored on the outside of the surface, bool [n].
         height_m: Height of each line's quad.
     """
@@ -102,7 +110,6 @@ class _Written:
     lines: tuple[SurfaceText, ...]
     starts: NDArray[np.intp]
     quads: SurfaceQuads
-    p_mesh: Array
     mirrored: NDArray[np.bool_]
     height_m: Array
 
@@ -110,30 +117,31 @@ class _Written:
 @lru_cache(maxsize=_PLACES)
 def _written_on(assets: AssetLibrary, asset_id: str, textures: tuple[str, ...]) -> _Written | None:
     """Lines on a mesh whose slots have these textures; empty = none, or without the mesh's UVs."""
-    if not can_write(assets, textures):
+    if not can_write(assets, (asset_id, *textures)):
         return None
-    assert isinstance(assets, WrittenTextures)
+    assert isinstance(assets, WrittenAssets)
     mesh = assets.mesh(asset_id)
-    lines = tuple(
+    own = map(place_on_mesh, assets.writing(asset_id))
+    printed = (
         line
         for slot, texture in enumerate(textures)
         if texture
         for line in place_writing(mesh, slot, assets.writing(texture))
         if not all(word.mirrored.all() for word in line.words)
     )
+    lines = (*own, *printed)
     if not lines:
         return None
     parts = [[line.quad, *(word.quads for word in line.words)] for line in lines]
     flat = [quads for part in parts for quads in part]
     quads = SurfaceQuads(*(np.concatenate([getattr(q, name) for q in flat])
-                           for name in ("face", "weights")))  # fmt: skip
+                           for name in ("face", "weights", "corners_m")))  # fmt: skip
     starts = np.cumsum([0, *(sum(len(q.face) for q in part) for part in parts)])
     flags = [f for line in lines for f in ([line.words[0].mirrored[:1]],
                                            [word.mirrored for word in line.words])]  # fmt: skip
-    p_mesh = quads.positions_m(mesh)
-    height_m = sides(p_mesh[starts[:-1]])[:, 1::2].max(axis=1)
+    height_m = sides(quads.corners_m[starts[:-1]])[:, 1::2].max(axis=1)
     mirrored = np.concatenate([flag for part in flags for flag in part])
-    return _Written(lines, starts, quads, p_mesh, mirrored, height_m)
+    return _Written(lines, starts, quads, mirrored, height_m)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -168,9 +176,9 @@ def _lines_in_view(
     for number, body in enumerate(scene.bodies):
         materials = body.materials or assets.materials(body.asset)
         textures = tuple("" if m.texture_scale_m else m.texture for m in materials)
-        written = _written_on(assets, body.asset, textures) if any(textures) else None
+        written = _written_on(assets, body.asset, textures)
         if written is not None:
-            p_body = written.p_mesh[written.starts[:-1]] * body.scale
+            p_body = written.quads.corners_m[written.starts[:-1]] * body.scale
             p_camera = (T_camera_world @ body.T_world_body).apply(p_body.reshape(-1, 3))
             near_m = np.linalg.norm(p_camera, axis=1).reshape(-1, 4).min(axis=1)
             # Lenses enlarge by less than twice their focal length.
@@ -224,7 +232,7 @@ def _project(
         tuple(scene.bodies[k].asset for k in np.repeat(body, 4).tolist()),
         np.concatenate([w.quads.face[rows].reshape(-1) for w, rows in parts]),
         np.concatenate([w.quads.weights[rows].reshape(-1, 3) for w, rows in parts]),
-        np.concatenate([w.p_mesh[rows].reshape(-1, 3) for w, rows in parts]),
+        np.concatenate([w.quads.corners_m[rows].reshape(-1, 3) for w, rows in parts]),
     )
     p_body = points.on_bodies(scene, assets)
     world = points.moving(scene, p_body)
@@ -271,8 +279,8 @@ def _visible_shares(
     return shares
 
 
-def _describe(scene: Scene, line: _Line, view: _View) -> sample.TextTruth:
-    """A line in an image."""
+def _describe(scene: Scene, line: _Line, view: _View, size: tuple[int, int]) -> sample.TextTruth:
+    """A line in an image of a size [px]."""
     text, body, start, words, shares = line.text, scene.bodies[line.body], 1, [], []
     areas = _areas_px(view.image_px)
     quads: list[sample.QuadPx] = [
@@ -282,28 +290,35 @@ def _describe(scene: Scene, line: _Line, view: _View) -> sample.TextTruth:
     for word in text.words:
         n = len(word.quads.face)
         rows = slice(start + 1, start + n)
-        letters = word.text or [""] * (n - 1)
+        letters = word.text if text.kind == "print" else [word.text]
         visible = view.visible[rows]
         characters = map(sample.CharacterTruth, letters, quads[rows], np.round(visible, 3).tolist())
         share = _mean(visible, areas[rows])
         shares.append((share, float(areas[rows].sum())))
         height_px, scale = _size(view.image_px[rows], view.places_m[rows])
-        least_px = LETTERS_PX if word.text.upper() != word.text else CAPITALS_PX
-        large = bool(word.text) and height_px * scale >= least_px
+        stroke_px = text.stroke * height_px * scale
+        if text.kind == "code":
+            inside = ((view.image_px >= 0.0) & (view.image_px <= size)).all()
+            readable = stroke_px >= MODULE_PX and bool(inside and visible.min() == 1.0)
+        else:
+            least_px = LETTERS_PX if word.text.upper() != word.text else CAPITALS_PX
+            readable = text.kind == "print" and height_px * scale >= least_px
+            readable = readable and bool((visible >= READABLE_SHARE).all())
         made = sample.WordTruth(
             word.text,
             quads[start],
             tuple(characters),
             round(share, 3),
             round(height_px, 2),
-            round(text.stroke * height_px * scale, 2),
-            large and bool((visible >= READABLE_SHARE).all()),
+            round(stroke_px, 2),
+            readable,
         )
         words.append(made)
         start += n
     return sample.TextTruth(
         text.text,
         text.language,
+        text.kind,
         quads[0],
         body.name,
         body.instance_id,

@@ -122,8 +122,8 @@ def check_text(
     """
     ids: dict[str, None] = {}
     for config, scene in zip(configs, scenes, strict=True):
-        materials = (material for body in scene.bodies for material in body.materials)
-        if can_write(assets, tuple(material.texture for material in materials)):
+        textures = (material.texture for body in scene.bodies for material in body.materials)
+        if can_write(assets, (*textures, *(body.asset for body in scene.bodies))):
             return
         ids |= dict.fromkeys(body.asset for body in scene.bodies)
         ids |= dict.fromkeys(asset for group in scene.groups for asset in group.assets)
@@ -139,8 +139,8 @@ def check_text(
     for asset_id in sorted(ids, key=order.__getitem__):
         # Of files it is not known what is on their images.
         if isinstance(known.get(asset_id.partition("?")[0]), Family):
-            textures = tuple(material.texture for material in assets.materials(asset_id))
-            if can_write(assets, textures):
+            own = tuple(material.texture for material in assets.materials(asset_id))
+            if can_write(assets, (asset_id, *own)):
                 return
     raise errors.ConfigError(
         f"{place}: nothing in the scenes is written on; add objects with print, such as "

@@ -92,7 +92,7 @@ def unpack_texture(arrays: Arrays) -> TextureData:
 
 def pack_writing(lines: Sequence[Writing]) -> Arrays:
     """Convert lines of text to plain arrays."""
-    facts = [(line.text, line.language, line.stroke, len(line.quads)) for line in lines]
+    facts = [(w.text, w.language, w.stroke, w.kind, len(w.quads)) for w in lines]
     quads = [line.quads for line in lines] or [np.zeros((0, 4, 2))]
     return {"lines": encode_text(canonical_json(facts)), "quads": np.concatenate(quads)}
 
@@ -100,8 +100,8 @@ def pack_writing(lines: Sequence[Writing]) -> Arrays:
 def unpack_writing(arrays: Arrays) -> tuple[Writing, ...]:
     """Restore lines of text. Raises KeyError if the arrays hold none."""
     facts, start, lines = json.loads(arrays["lines"].tobytes()), 0, []
-    for text, language, stroke, count in facts:
-        lines.append(Writing(text, language, arrays["quads"][start : start + count], stroke))
+    for text, language, stroke, kind, count in facts:
+        lines.append(Writing(text, language, arrays["quads"][start : start + count], stroke, kind))
         start += count
     return tuple(lines)
 

@@ -30,10 +30,10 @@ VEHICLES = frozenset(
 _ENTRIES = 8192
 _SUMMARIES = 4096
 """Kept in memory: about 1 and 5 kB each."""
-_BOUNDS, _WRITING = "bounds 1", "writing 1"
+_BOUNDS, _WRITING = "bounds 1", "writing 2"
 """Names of stored bounds and lines of text; they change with their definitions."""
 _WRITES = "writing"
-"""Fact that families of textures with text declare."""
+"""Fact of families with text: true for textures, a function of an object's arguments."""
 
 
 def open_library(
@@ -265,16 +265,16 @@ class Library:
             return self._generated.texture(parse_asset_id(texture_id))
         return self._files.texture(texture_id)
 
-    def writing(self, texture_id: str) -> tuple[Writing, ...]:
-        """Lines of text on a texture; see ``WrittenTextures``."""
-        if not families.declared(texture_id, _WRITES, default=False):
+    def writing(self, asset_id: str) -> tuple[Writing, ...]:
+        """Lines of text on a texture or an object's mesh; see ``WrittenAssets``."""
+        if not families.declared(asset_id, _WRITES, default=False):
             return ()
 
         def read() -> tuple[Writing, ...]:
-            compute = partial(self._generated.writing, parse_asset_id(texture_id))
-            return asset_arrays.unpack_writing(self.derived(texture_id, _WRITING, compute))
+            compute = partial(self._generated.writing, parse_asset_id(asset_id))
+            return asset_arrays.unpack_writing(self.derived(asset_id, _WRITING, compute))
 
-        return self._writing.get(texture_id, read)
+        return self._writing.get(asset_id, read)
 
     def mean_color(self, texture_id: str) -> se3.Vec3:
         """Mean reflectance of a texture, linear RGB."""

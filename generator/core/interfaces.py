@@ -194,13 +194,13 @@ class DerivedArrays(Protocol):
 
 
 @runtime_checkable
-class WrittenTextures(Protocol):
-    """An AssetLibrary that knows what is written on its textures."""
+class WrittenAssets(Protocol):
+    """An AssetLibrary that knows what is written on its textures and meshes."""
 
-    def writing(self, texture_id: str) -> tuple[Writing, ...]:
-        """Lines of text on a texture, in the order of drawing.
+    def writing(self, asset_id: str) -> tuple[Writing, ...]:
+        """Lines of text on a texture, or of a mesh itself, in the order of drawing.
 
-        Empty for textures without text, and for images of files. Raises AssetError as the library.
+        Empty for assets without text, and for files. Raises AssetError as the library.
         """
         ...
 

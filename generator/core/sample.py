@@ -12,6 +12,7 @@ from gen_data.core import boxes, lane_geometry, se3, serialization
 from gen_data.core.capture import Capture
 from gen_data.core.motion import STILL, Twist
 from gen_data.core.scene import Camera, Instance, Scene
+from gen_data.core.writing import Kind
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -192,6 +193,8 @@ class TextTruth:
         text: The line; empty for strokes that only look like writing.
         language: ISO 639-1 code; ``zxx`` for numbers and codes, ``und`` for invented names, ``mul``
             for several languages.
+        kind: ``print``; ``scribble`` for strokes that only look like writing; ``code`` for a
+            two-dimensional code, whose only word and character is its content.
         quad_px: Corners of its ink; they may lie outside the image.
         body: Name of the body that it is on.
         instance_id: Its instance; 0 = background.
@@ -202,6 +205,7 @@ class TextTruth:
 
     text: str
     language: str
+    kind: Kind
     quad_px: QuadPx
     body: str
     instance_id: int

@@ -5,7 +5,7 @@ is followed from character to character: each one is on the triangle that contai
 image and is nearest to where the one before points.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gen_data.core.asset_types import MeshData
 from gen_data.core.se3 import Array
-from gen_data.core.writing import Writing
+from gen_data.core.writing import Kind, Writing
 
 Rows = NDArray[np.intp]
 _INSIDE = 1e-6
@@ -33,15 +33,12 @@ class SurfaceQuads:
         face: Index of the triangle of each corner, [n, 4].
         weights: Barycentric weights of the corners, [n, 4, 3]; outside of [0, 1] for a corner
             beyond the edge of the surface.
+        corners_m: Corners in the frame of the mesh [m], [n, 4, 3].
     """
 
     face: Rows
     weights: Array
-
-    def positions_m(self, mesh: MeshData) -> Array:
-        """Corners in the frame of the mesh [m], [n, 4, 3]."""
-        corners = mesh.vertices_m[mesh.faces[self.face]].astype(np.float64)
-        return np.asarray(np.einsum("nqk,nqki->nqi", self.weights, corners, optimize=False))
+    corners_m: Array
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,6 +65,7 @@ class SurfaceText:
         text: Characters and spaces that are on the mesh.
         language: As in ``Writing``.
         stroke: As in ``Writing``.
+        kind: As in ``Writing``.
         complete: Whether all characters of the line are on the mesh.
         quad: Quad of the line.
         words: Its words, in reading order.
@@ -76,6 +74,7 @@ class SurfaceText:
     text: str
     language: str
     stroke: float
+    kind: Kind
     complete: bool
     quad: SurfaceQuads
     words: tuple[SurfaceWord, ...]
@@ -91,10 +90,27 @@ def place_writing(mesh: MeshData, slot: int, lines: Sequence[Writing]) -> tuple[
         # Rows of images count down, v counts up.
         uv = np.stack([line.quads[..., 0], 1.0 - line.quads[..., 1]], axis=-1)
         for shift in chart.shifts():
-            found += [
-                _lay_out(chart, line, uv + shift, strand) for strand in _strands(chart, uv + shift)
-            ]
+            for strand in _strands(chart, uv + shift):
+                locate = _on_chart(chart, uv + shift, strand.triangles)
+                found.append(_lay_out(line, sorted(strand.triangles), locate))
     return tuple(found)
+
+
+def place_on_mesh(line: Writing) -> SurfaceText:
+    """A line whose quads are in the frame of a rigid mesh."""
+    return _lay_out(line, range(len(line.quads)), _in_frame(line.quads))
+
+
+def _in_frame(quads: Array) -> "_Locate":
+    """Quads in the frame of a mesh, which are on no triangle."""
+
+    def locate(rows: Sequence[Sequence[int]]) -> tuple[SurfaceQuads, NDArray[np.bool_]]:
+        corners_m = np.stack([_around(quads[list(row)]) for row in rows])
+        n = len(corners_m)
+        found = SurfaceQuads(np.zeros((n, 4), np.intp), np.zeros((n, 4, 3)), corners_m)
+        return found, np.zeros(n, np.bool_)
+
+    return locate
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -227,54 +243,58 @@ def _distinct(rows: Rows, points_m: Array) -> list[int]:
     return kept
 
 
-def _lay_out(chart: _Chart, line: Writing, uv: Array, strand: _Strand) -> SurfaceText:
-    """Corners of a strand's characters, words and line on the mesh."""
-    numbers = sorted(strand.triangles)
+_Locate = Callable[[Sequence[Sequence[int]]], tuple[SurfaceQuads, NDArray[np.bool_]]]
+"""Finds the quads around some groups of characters, and whether they are mirrored."""
+
+
+def _on_chart(chart: _Chart, uv: Array, triangles: Mapping[int, int]) -> _Locate:
+    """Characters [n, 4, 2] whose triangles are known."""
+
+    def locate(rows: Sequence[Sequence[int]]) -> tuple[SurfaceQuads, NDArray[np.bool_]]:
+        corners = np.stack([_around(uv[list(row)]) for row in rows]).reshape(-1, 2)
+        ends = np.array([[triangles[row[0]], triangles[row[-1]]] for row in rows])
+        triangle = chart.nearest(corners, ends[:, [0, 1, 1, 0]].reshape(-1))
+        found = SurfaceQuads(
+            chart.face[triangle].reshape(-1, 4),
+            chart.weights(corners, triangle).reshape(-1, 4, 3),
+            chart.positions_m(corners, triangle).reshape(-1, 4, 3),
+        )
+        return found, chart.mirrored[ends[:, 0]]
+
+    return locate
+
+
+def _lay_out(line: Writing, numbers: Sequence[int], locate: _Locate) -> SurfaceText:
+    """A line with some of its characters, by their numbers, on a surface."""
     letters = [k for k, letter in enumerate(line.text) if not letter.isspace()]
-    words = []
-    # The place in the text of every character that the strand has.
-    places = {k: letters[k] for k in numbers} if line.text else dict.fromkeys(numbers, 0)
-    group: list[int] = []
+    if line.kind != "print":
+        quads, mirrored = locate([numbers, numbers])
+        word = SurfaceWord(line.text, quads, mirrored)
+        quad = locate([numbers])[0]
+        return SurfaceText(line.text, line.language, line.stroke, line.kind, True, quad, (word,))
+    groups: list[list[int]] = []
     for k in numbers:
-        if group and any(c.isspace() for c in line.text[places[group[-1]] : places[k]]):
-            words.append(group)
-            group = []
-        group.append(k)
-    words.append(group)
-
-    def spread(chosen: Sequence[int]) -> tuple[Array, Rows]:
-        first, last = (strand.triangles[chosen[end]] for end in (0, -1))
-        return _around(uv[list(chosen)]), np.array([first, last, last, first])
-
-    def locate(quads: Array, guess: Rows) -> SurfaceQuads:
-        corners, on = quads.reshape(-1, 2), guess.reshape(-1)
-        triangle = chart.nearest(corners, on)
-        weights = chart.weights(corners, triangle).reshape(-1, 4, 3)
-        return SurfaceQuads(chart.face[triangle].reshape(-1, 4), weights)
-
-    made = []
-    for group in words:
-        around, ends = spread(group)
-        on = np.array([strand.triangles[k] for k in group])
-        quads = np.concatenate([around[None], uv[group]])
-        guess = np.concatenate([ends[None], np.repeat(on[:, None], 4, axis=1)])
-        text = "".join(line.text[places[k]] for k in group) if line.text else ""
-        mirrored = chart.mirrored[np.concatenate([on[:1], on])]
-        made.append(SurfaceWord(text, locate(quads, guess), mirrored))
-    around, ends = spread(numbers)
-    whole = len(numbers) == len(uv)
-    text = line.text if whole else " ".join(word.text for word in made)
-    quad = locate(around[None], ends[None])
-    return SurfaceText(text, line.language, line.stroke, whole, quad, tuple(made))
+        between = line.text[letters[groups[-1][-1]] : letters[k]] if groups else " "
+        if any(c.isspace() for c in between):
+            groups.append([])
+        groups[-1].append(k)
+    words = []
+    for group in groups:
+        quads, mirrored = locate([group, *([k] for k in group)])
+        words.append(SurfaceWord("".join(line.text[letters[k]] for k in group), quads, mirrored))
+    whole = len(numbers) == len(letters)
+    text = line.text if whole else " ".join(word.text for word in words)
+    quad = locate([numbers])[0]
+    return SurfaceText(text, line.language, line.stroke, line.kind, whole, quad, tuple(words))
 
 
 def _around(quads: Array) -> Array:
-    """The smallest parallelogram around quads [n, 4, 2] of the same directions, [4, 2]."""
+    """The smallest parallelogram around quads [n, 4, k] of the same directions, [4, k]."""
     right, down = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
-    area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
+    area = np.linalg.norm(right, axis=1) * np.linalg.norm(down, axis=1)
     largest = int(area.argmax())
     axes = np.stack([right[largest], down[largest]])
-    shares = (quads.reshape(-1, 2) - quads[0, 0]) @ np.linalg.inv(axes)
+    shares = (quads.reshape(-1, quads.shape[2]) - quads[0, 0]) @ np.linalg.pinv(axes)
     (x0, y0), (x1, y1) = shares.min(axis=0), shares.max(axis=0)
     corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     return np.asarray(corners @ axes + quads[0, 0])

@@ -11,6 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from gen_data.annotations.text import CAPITALS_PX, LETTERS_PX, Text
+from gen_data.assets.asset_ids import parse_asset_id
+from gen_data.assets.drape import draped_id
 from gen_data.assets.families import known_families
 from gen_data.assets.family import TextureFamily
 from gen_data.content.procedural.textures import artwork as art
@@ -23,7 +25,9 @@ from gen_data.core.scene import Body, Camera, Scene
 from gen_data.core.se3 import SE3, look_at
 from gen_data.core.serialization import canonical_json, from_plain
 from gen_data.core.writing import Writing, recording
+from tests.assets.test_draped_meshes import HILL, PLACE
 from tests.embree import RayCaster, placed
+from tests.libraries import library
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 
 SHEET_PX = (2048, 1024)
@@ -103,27 +107,35 @@ class Seen:
 
 
 def look(asset: str, view: Camera, *others: Body, **fields: float) -> Seen:
-    bodies = (Body("print", asset, instance_id=1), *others)
+    """A sheet at the origin, with its ink."""
+    seen, points_m, face = cast(
+        ASSETS, view, Body("print", asset, instance_id=1), *others, **fields
+    )
+    own = seen.body == 0
+    seen.ink[own] = inked(ASSETS.mesh(asset), face[own], points_m[own])
+    return seen
+
+
+def cast(
+    assets: Any, view: Camera, *bodies: Body, **fields: float
+) -> tuple[Seen, NDArray[np.float64], NDArray[np.int32]]:
+    """An image without ink; places on rays, and faces that they hit."""
     scene = Scene("s", bodies=bodies, cameras=(view,))
     rays = view.T_world_camera.rotate(view.intrinsics.pixel_rays())
     eye = np.array(view.T_world_camera.translation_m)
-    hits = RayCaster(*(placed(body, ASSETS) for body in bodies)).cast(eye, rays)
+    hits = RayCaster(*(placed(body, assets) for body in bodies)).cast(eye, rays)
     ids = np.array([0, *(body.instance_id for body in bodies)], np.uint16)[hits.mesh + 1]
     length = np.linalg.norm(rays, axis=-1)
     channels = {Channel.INSTANCE: ids, Channel.RANGE: (hits.distance * length).astype(np.float32)}
     reading = SensorReading("color", view, channels)
-    truth = Text(**fields).annotate_image(scene, ASSETS, reading, ImageTruth(view, ()))
+    truth = Text(**fields).annotate_image(scene, assets, reading, ImageTruth(view, ()))
     assert truth.texts is not None
-    own = hits.mesh == 0
-    ink = np.zeros(own.shape, np.bool_)
-    ink[own] = inked(
-        ASSETS.mesh(asset), hits.face[own], (eye + rays * hits.distance[..., None])[own]
-    )
-    return Seen(truth.texts, hits.mesh, ink)
+    points_m = eye + rays * hits.distance[..., None]
+    return Seen(truth.texts, hits.mesh, np.zeros(ids.shape, np.bool_)), points_m, hits.face
 
 
-def inked(mesh: MeshData, face: Any, points_m: Any) -> NDArray[np.bool_]:
-    """Whether points [n, 3] on triangles [n] show ink, by the interpolated UVs."""
+def uvs_at(mesh: MeshData, face: Any, points_m: Any) -> NDArray[np.float64]:
+    """UVs [n, 2] at points [n, 3] on triangles [n]."""
     known, number = np.unique(face, return_inverse=True)
     corners = mesh.vertices_m[mesh.faces[known]].astype(np.float64)
     edges = np.linalg.pinv(
@@ -131,7 +143,12 @@ def inked(mesh: MeshData, face: Any, points_m: Any) -> NDArray[np.bool_]:
     )
     two = np.einsum("nij,nj->ni", edges[number], points_m - corners[number, 0])
     weights = np.column_stack([1.0 - two.sum(axis=1), two])
-    u, v = np.einsum("nk,nki->in", weights, mesh.uvs[mesh.faces[face]].astype(np.float64))
+    return np.asarray(np.einsum("nk,nki->ni", weights, mesh.uvs[mesh.faces[face]].astype(float)))
+
+
+def inked(mesh: MeshData, face: Any, points_m: Any) -> NDArray[np.bool_]:
+    """Whether points [n, 3] on triangles [n] show ink."""
+    u, v = uvs_at(mesh, face, points_m).T
     columns = np.floor(u % 1.0 * SHEET_PX[0]).astype(int).clip(0, SHEET_PX[0] - 1)
     rows = np.floor((1.0 - v % 1.0) * SHEET_PX[1]).astype(int).clip(0, SHEET_PX[1] - 1)
     return np.asarray(printed()[0][rows, columns])
@@ -260,6 +277,113 @@ def test_text_is_listed_once_per_place_and_cut_where_the_surface_ends() -> None:
     assert all(t.text and line.startswith(t.text) for t, line in zip(cut, TWO_LINES, strict=True))
     behind = replace(camera(0.5), T_world_camera=look_at((-0.5, 0.1, 0.1), (0.0, 0.0, 0.0)))
     assert look("flat", behind).truth == ()
+
+
+def test_a_code_has_the_content_and_corners_that_a_detector_finds() -> None:
+    """OpenCV's, in an image of the inked faces; its corners are pixel centres."""
+    view, body = camera(0.4, side=0.2), Body("code", "qr_code?seed=3&side_m=0.15", instance_id=1)
+    body = replace(body, T_world_body=SE3((0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5)))
+    seen, _, face = cast(library(), view, body)
+    (text,) = seen.truth
+    mesh = library().mesh(body.asset)
+    image = np.where((seen.body == 0) & (mesh.face_slots[face] == 1), 0, 255).astype(np.uint8)
+    content, corners, _ = cv2.QRCodeDetector().detectAndDecode(image)
+    assert text.text == content == dict(library().get(body.asset).attributes)["text"]
+    assert text.kind == "code" and text.language == "zxx" and text.words[0].readable
+    gaps = np.abs(np.array(text.quad_px) - 0.5 - corners[0]).max(axis=1)
+    # The lower right corner has no pattern: detectors extend the sides.
+    assert (gaps < (1.2, 1.2, 3.0, 1.2)).all()
+    side_px = np.linalg.norm(np.subtract(text.quad_px[0], text.quad_px[3]))
+    assert text.words[0].stroke_px == pytest.approx(side_px / 21.0, rel=0.06)
+    far = cast(library(), replace(view, T_world_camera=look_at((2.5, 0.3, 0.2), (0, 0, 0))), body)
+    assert not far[0].truth[0].words[0].readable
+    cut = replace(view, intrinsics=replace(view.intrinsics, cy_px=0.0))
+    assert not cast(library(), cut, body)[0].truth[0].words[0].readable
+
+
+@pytest.mark.parametrize("ground", ["level", "hill"])
+def test_words_on_roads_have_the_letters_that_rays_meet(ground: str) -> None:
+    """On level ground and on a hill: paint is in the quads and touches their sides."""
+    asset, road = "road_marking?sign=word&text=_BUS", "road"
+    if ground == "hill":
+        asset, road = (draped_id(parse_asset_id(a), PLACE, 1.0, HILL) for a in (asset, road))
+    bounds = np.array(library().bounds_m(asset))
+    middle = bounds.mean(axis=0)
+    eye = middle + np.array((-6.0, 1.0, 4.0))
+    lens = Intrinsics(640, 480, 500.0, 500.0, 320.0, 240.0, BENT_LENS)
+    view = Camera("color", look_at(tuple(eye), tuple(middle)), lens)
+    seen, _, _ = cast(library(), view, Body("word", asset), Body("road", road))
+    (text,) = seen.truth
+    assert text.text == "BUS" and text.words[0].readable and text.instance_id == 0
+    paint = np.argwhere(seen.body == 0)[:, ::-1] + 0.5
+    covered = np.zeros(len(paint), np.bool_)
+    for character in text.words[0].characters:
+        gaps = to_sides(character.quad_px, paint)
+        inside = (gaps > -1.0).all(axis=1)
+        assert np.abs(gaps[inside].min(axis=0)).max() < 1.75
+        assert character.visible_fraction == 1.0
+        covered |= inside
+    assert covered.all()
+
+
+@pytest.mark.parametrize(
+    ("asset", "eye"),
+    [("book?seed=3", (0.1, -0.1, 0.4)), ("can?seed=5", (0.3, 0.05, 0.1)),
+     ("mug?seed=44", (0.0, 0.35, 0.05)), ("street_name_plate?seed=1", (1.5, 0.4, 2.6)),
+     ("traffic_sign?seed=0&sign=stop", (2.0, 0.3, 2.0)), ("car?seed=2", (4.0, 0.4, 0.4)),
+     ("keyboard?seed=2", (0.05, -0.2, 0.4))],
+)  # fmt: skip
+def test_the_ray_through_a_character_meets_the_texture_where_it_is_drawn(
+    asset: str, eye: tuple[float, float, float]
+) -> None:
+    """On assets of the library; by the UVs of the triangle that Embree finds."""
+    bounds = np.array(library().bounds_m(asset))
+    aim = (0.0, 0.0, float(bounds[:, 2].mean()))
+    if asset.startswith(("traffic", "street")):
+        aim = (0.0, 0.0, float(bounds[1, 2]) - 0.3)
+    view = Camera(
+        "color", look_at(eye, aim), Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0, BENT_LENS)
+    )
+    seen, _, _ = cast(library(), view, Body("thing", asset, instance_id=1), min_height_px=3.0)
+    assert seen.truth
+    mesh, checked = library().mesh(asset), 0
+    origin = np.array(view.T_world_camera.translation_m)
+    for text in seen.truth:
+        for word in text.words:
+            shown = [
+                c for c in word.characters if c.visible_fraction == 1.0 and least_side(c) > 2.0
+            ]
+            if not shown:
+                continue
+            centres = np.array([np.mean(c.quad_px, axis=0) for c in shown])
+            rays = view.T_world_camera.rotate(view.intrinsics.rays(centres))
+            hits = RayCaster(placed(Body("thing", asset), library())).cast(origin, rays)
+            points_m = origin + rays * hits.distance[..., None]
+            for uv, face, character in zip(
+                uvs_at(mesh, hits.face, points_m), hits.face, shown, strict=True
+            ):
+                texture = mesh.materials[mesh.face_slots[face]].texture
+                assert any(
+                    is_there(line, character.text, uv) for line in library().writing(texture)
+                )
+                checked += 1
+    assert checked >= 2
+
+
+def least_side(character: Any) -> float:
+    quad = np.array(character.quad_px)
+    return float(np.linalg.norm(np.roll(quad, -1, axis=0) - quad, axis=1).min())
+
+
+def is_there(line: Writing, letter: str, uv: Any) -> bool:
+    """Whether a line has a letter in the middle of which is a place, to a quarter of its size."""
+    letters = [c for c in line.text if not c.isspace()]
+    x, y = uv[0] % 1.0, (1.0 - uv[1]) % 1.0
+    for own, quad in zip(letters, line.quads, strict=False):
+        size = np.ptp(quad, axis=0)
+        if own == letter and (np.abs(quad.mean(axis=0) - (x, y)) < 0.25 * size + 2e-3).all():
+            return True
+    return False
 
 
 def test_annotations_survive_being_stored() -> None:

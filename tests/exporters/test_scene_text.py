@@ -40,8 +40,9 @@ def word(text: str, left: float, top: float, *, seen: tuple[float, ...] = (), le
 
 
 def line(language: str, *words: WordTruth) -> TextTruth:
-    return TextTruth(" ".join(w.text for w in words), language, words[0].quad_px, "sign", 3, 1.0,
-                     True, words)  # fmt: skip
+    kind = "print" if words[0].text else "scribble"
+    return TextTruth(" ".join(w.text for w in words), language, kind, words[0].quad_px, "sign", 3,
+                     1.0, True, words)  # fmt: skip
 
 
 LINES = (

@@ -28,7 +28,7 @@ def word(text: str, quad: object, shares: tuple[float, ...], *, readable: bool) 
 
 def sample(*words: WordTruth) -> Sample:
     grey = {Channel.RGB: np.full((60, 80, 3), 90, np.uint8)}
-    text = TextTruth("AB", "zxx", BOTH, "sign", 1, 1.0, True, words)
+    text = TextTruth("AB", "zxx", "print", BOTH, "sign", 1, 1.0, True, words)
     truth = ImageTruth(CAMERA, (), texts=(text,))
     capture = Capture({"color": SensorReading("color", CAMERA, grey)})
     return Sample(0, 0, 0, "train", Scene("s", cameras=(CAMERA,)), capture, {"color": truth})

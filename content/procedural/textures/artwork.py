@@ -90,7 +90,8 @@ def note(
     high = float((places[:, 3] - places[:, 1]).max())
     shares = writing.boxes_to_quads(places) / image.size
     language = language or language_of(text)
-    line = writing.Writing(text.strip(), language, shares, stroke_px / max(high, 1.0))
+    kind: writing.Kind = "print" if text else "scribble"
+    line = writing.Writing(text.strip(), language, shares, stroke_px / max(high, 1.0), kind)
     image.info[_WRITING] = (*_noted(image), line)
 
 
