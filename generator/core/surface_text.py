@@ -21,6 +21,8 @@ _INSIDE = 1e-6
 """Tolerance of barycentric weights."""
 _STRAY = 0.5
 """Largest distance from where the character before points, over the distance to it."""
+_SQUEEZED = 1.5
+"""Proportions of letters that differ by more are due to rims."""
 _CELLS = 2_000_000
 """Points times triangles that are compared at once."""
 
@@ -81,19 +83,39 @@ class SurfaceText:
 
 
 def place_writing(mesh: MeshData, slot: int, lines: Sequence[Writing]) -> tuple[SurfaceText, ...]:
-    """Find the places of a texture's lines on the faces of a slot, which have the mesh's UVs."""
+    """Find the places of a texture's lines on the faces of a slot, which have the mesh's UVs.
+
+    Rims that show the whole texture squeezed, such as edges of a printed plate, are left out.
+    """
     chart = _Chart.of_slot(mesh, slot)
     if chart is None:
         return ()
-    found = []
+    found: list[SurfaceText] = []
     for line in lines:
+        places: list[SurfaceText] = []
         # Rows of images count down, v counts up.
         uv = np.stack([line.quads[..., 0], 1.0 - line.quads[..., 1]], axis=-1)
         for shift in chart.shifts():
             for strand in _strands(chart, uv + shift):
                 locate = _on_chart(chart, uv + shift, strand.triangles)
-                found.append(_lay_out(line, sorted(strand.triangles), locate))
+                places.append(_lay_out(line, sorted(strand.triangles), locate))
+        found += _not_squeezed(places)
     return tuple(found)
+
+
+def _not_squeezed(places: Sequence[SurfaceText]) -> list[SurfaceText]:
+    """Places of a line with about the proportions of the letters on the largest one."""
+    if len(places) < 2:
+        return list(places)
+    sizes = []
+    for place in places:
+        letters = np.concatenate([word.quads.corners_m[1:] for word in place.words])
+        sizes.append([np.linalg.norm(letters[:, k] - letters[:, 0], axis=1).mean() for k in (1, 3)])
+    wide, high = np.array(sizes).T + 1e-9
+    aspects = wide / high
+    usual = aspects[int((wide * high).argmax())]
+    kept = (aspects * _SQUEEZED >= usual) & (aspects <= _SQUEEZED * usual)
+    return [place for place, keep in zip(places, kept.tolist(), strict=True) if keep]
 
 
 def place_on_mesh(line: Writing) -> SurfaceText:

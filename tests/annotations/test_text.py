@@ -386,6 +386,14 @@ def is_there(line: Writing, letter: str, uv: Any) -> bool:
     return False
 
 
+def test_a_plate_has_its_text_once_though_its_edges_show_the_texture_too() -> None:
+    """In front and behind, and nothing on the edges of the plates, 6 cm thick."""
+    view = Camera("color", look_at((5.3, 2.5, 1.2), (2.3, 0.0, 0.5)),
+                  Intrinsics(640, 480, 2000.0, 2000.0, 320.0, 240.0))  # fmt: skip
+    seen, _, _ = cast(library(), view, Body("car", "car?seed=2", instance_id=1))
+    assert [t.text for t in seen.truth if len(t.text) > 2] == ["AR SD 786"]
+
+
 def test_annotations_survive_being_stored() -> None:
     truth = ImageTruth(camera(0.5), (), texts=look("flat", camera(0.5)).truth)
     assert from_plain(ImageTruth, json.loads(canonical_json(truth))).texts == truth.texts
