@@ -4,6 +4,7 @@ A body that changes its mesh, such as a person who walks, carries its points alo
 have the same triangles; otherwise they keep their places in the body's frame.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from gen_data.core import se3
 from gen_data.core.asset_types import MeshData
 from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.scene import Scene
+from gen_data.core.scene import Body, Scene
 
 Rows = NDArray[np.intp]
 REACH_M = 1e-3
@@ -110,8 +111,11 @@ def find_surface_points(
         rows = wanted.get(item.instance_id)
         if rows is None:
             continue
-        p = item.T_world_body.inverse().apply(p_world[rows]) / item.scale
         low, high = assets.bounds_m(item.asset)
+        rows = rows[_are_around(item, low, high, p_world[rows], reach_m)]
+        if not len(rows):
+            continue
+        p = item.T_world_body.inverse().apply(p_world[rows]) / item.scale
         near = ((p >= np.subtract(low, reach_m)) & (p <= np.add(high, reach_m))).all(axis=1)
         if not near.any():
             continue
@@ -127,6 +131,18 @@ def find_surface_points(
     names = tuple(scene.bodies[k].asset for k in body[kept].tolist())
     points = SurfacePoints(body[kept], names, face[kept], weights[kept], p_mesh[kept])
     return points, kept
+
+
+def _are_around(
+    body: Body, low: se3.Vec3, high: se3.Vec3, p_world: se3.Array, reach_m: float
+) -> NDArray[np.bool_]:
+    """Whether places are in the ball around a body's bounds, or near it: a quick test."""
+    x, y, z = (0.5 * body.scale * (a + b) for a, b in zip(low, high, strict=True))
+    pose = body.T_world_body
+    turned = se3.rotate_by_quaternion(pose.quaternion_wxyz, (x, y, z))
+    away = p_world - np.add(turned, pose.translation_m)
+    radius_m = body.scale * (0.5 * math.dist(low, high) + 2.0 * reach_m) + REACH_M
+    return np.asarray((away * away).sum(axis=1) < radius_m**2)
 
 
 def _nearest_triangles(
