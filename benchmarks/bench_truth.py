@@ -1,8 +1,8 @@
 """CPU time of truth that is made on request, and its bounds: ``python -m benchmarks.bench_truth``.
 
 A row per kind: median and maximum over scenes, in milliseconds per image or frame, or relative to
-``depth`` alone. Once per scene done work is shared by its 20 frames. One process; the first
-scene of each configuration warms caches and does not count. Names of kinds choose rows.
+``depth`` alone. What is done once per scene is shared by its 20 frames. One process; scenes are
+made twice, and the first time, which fills caches, does not count. Names of kinds choose rows.
 """
 
 import argparse
@@ -179,12 +179,12 @@ ROWS = (
 
 
 def sequences(pipeline: Pipeline, scenes: int) -> Iterator[list[Sample]]:
-    """Up to 20 frames of the first view of some scenes, and before them of one that warms."""
+    """Up to 20 frames of the first view of some scenes, which were all made once before."""
     info = pipeline.info
-    for scene in range(scenes + 1):
-        first = scene * info.views_per_scene * info.steps_per_scene
+    for number in range(2 * scenes):
+        first = number % scenes * info.views_per_scene * info.steps_per_scene
         samples = [pipeline.sample(first + k) for k in range(min(STEPS, info.steps_per_scene))]
-        if scene:
+        if number >= scenes:
             yield samples
 
 
