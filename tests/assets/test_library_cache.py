@@ -114,7 +114,7 @@ def test_a_damaged_large_entry_is_made_anew(tmp_path: Path, damage: str) -> None
 
 
 def test_a_large_entry_is_checked_once_per_machine_and_again_after_a_change(tmp_path: Path) -> None:
-    """Caches stand for processes. Damage that leaves the time of the last change is not looked for."""
+    """Caches stand for processes; damage that leaves the time of the last change stays unseen."""
     key = content_key({"name": "large"})
     DiskCache(tmp_path).arrays(key, large_arrays)
     (path,) = entries(tmp_path)
