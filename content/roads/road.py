@@ -357,8 +357,7 @@ def _hulls(deck: Deck, profile: RoadShape) -> list[Array]:
     """Collision slabs of at most 20 m under every strip."""
     stations = np.linspace(0.0, profile.length_m, max(2, int(np.ceil(profile.length_m / 20.0)) + 1))
     rows = {
-        side: [strip for strip in strips(profile, side) if strip.kind != "kerb"]
-        for side in (1, -1)
+        side: [strip for strip in strips(profile, side) if strip.kind != "kerb"] for side in (1, -1)
     }
     hulls = []
     for s0, s1 in pairwise(stations):

@@ -183,5 +183,3 @@ def _integral(of: Callable[[Array], Array], upper: Array, panels: int) -> Array:
     x = starts + 0.5 * width * (1.0 + _NODES)
     total: Array = (0.5 * width * _WEIGHTS * of(x)).sum(axis=(1, 2))
     return total
-
-
