@@ -8,7 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -115,13 +115,13 @@ class Shape:
 
 
 # A room asks a hundred thousand times for the facts of a few dozen families.
-@cache
+@lru_cache(maxsize=1024)
 def is_flat(family: str) -> bool:
     """Whether pieces of a family lie on the floor and others stand on them."""
     return bool(declared(family, "flat", False))
 
 
-@cache
+@lru_cache(maxsize=1024)
 def _free_above_m(family: str) -> float:
     """Height above pieces of a family that others leave free."""
     return float(declared(family, "free_above_m", 0.0))
