@@ -49,11 +49,11 @@ class LaneLine:
         """
         points = self.lane.center_m
         k = min(max(bisect_right(self.at_m, at_m) - 1, 0), len(points) - 2)
-        a, b = points[k], points[k + 1]
+        (ax, ay, az), (bx, by, bz) = points[k], points[k + 1]
         span_m = self.at_m[k + 1] - self.at_m[k]
         t = min(max((at_m - self.at_m[k]) / span_m, 0.0), 1.0)
-        yaw = math.atan2(b[1] - a[1], b[0] - a[0])
-        x, y, z = (p + t * (q - p) for p, q in zip(a, b, strict=True))
+        yaw = math.atan2(by - ay, bx - ax)
+        x, y, z = ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az)
         return SE3.about_z(yaw, (x - left_m * math.sin(yaw), y + left_m * math.cos(yaw), z))
 
 

@@ -1,5 +1,6 @@
 """The cache: same bytes with it, without it, and when it is damaged."""
 
+import os
 import subprocess
 import sys
 from dataclasses import fields
@@ -110,6 +111,23 @@ def test_a_damaged_large_entry_is_made_anew(tmp_path: Path, damage: str) -> None
     arrays = disk.arrays(key, large_arrays)
     np.testing.assert_array_equal(arrays["x"], large_arrays()["x"])
     assert path.read_bytes() != data
+
+
+def test_a_large_entry_is_checked_once_per_machine_and_again_after_a_change(tmp_path: Path) -> None:
+    """Caches stand for processes; damage that leaves the time of the last change stays unseen."""
+    key = content_key({"name": "large"})
+    DiskCache(tmp_path).arrays(key, large_arrays)
+    (path,) = entries(tmp_path)
+    if not os.listxattr(path):
+        pytest.skip("this file system has no extended attributes")
+    unchanged = path.stat()
+    with path.open("r+b") as file:
+        file.seek(150_000)
+        file.write(b"\xff")
+    os.utime(path, ns=(unchanged.st_atime_ns, unchanged.st_mtime_ns))
+    assert DiskCache(tmp_path).find(key) is not None
+    os.utime(path, ns=(unchanged.st_atime_ns, unchanged.st_mtime_ns + 1_000_000_000))
+    assert DiskCache(tmp_path).find(key) is None
 
 
 def test_derived_arrays_are_stored_by_asset_and_name(tmp_path: Path) -> None:
