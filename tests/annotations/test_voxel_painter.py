@@ -113,8 +113,8 @@ def test_a_scanner_observes_the_voxels_that_lines_pass_for_half_a_voxel() -> Non
     alone = [observed(points[k : k + 1]) for k in range(len(ends))]
     origin = (np.array([-6.0, 0.3, 0.4]) - BOX.low_m) / BOX.voxel_m
     places = (ends - BOX.low_m) / BOX.voxel_m
-    inside = ((places >= 0) & (places < SHAPE)).all(axis=1)
-    for seen, place, ends_inside in zip(alone, places, inside, strict=True):
+    inside = np.asarray(((places >= 0) & (places < SHAPE)).all(axis=1))
+    for seen, place, ends_inside in zip(alone, places, inside.tolist(), strict=True):
         passed = chords(origin, place)
         if ends_inside:
             voxel = tuple(np.floor(place).astype(int))
