@@ -5,7 +5,7 @@
     <split>/000000.rrd           the first samples of a split (``samples_per_file``), and so on
 
 Timelines are ``sample``, the index of the sample, and for sequences ``time`` [s], with one sequence
-after the other. Entities:
+after the other. Times are true, also of sensors with a wrong clock. Entities:
 
 ===================================  ==============================================================
 ``world``                            right-handed, Z up; ``/`` has the names of the classes
@@ -15,6 +15,7 @@ after the other. Entities:
 ``world/cameras/<name>/image/...``   ``rgb``, ``depth`` and ``measured_depth`` as PNG files,
                                      ``category``, ``boxes``, and ``keypoints/<instance id>``
 ``world/lidars/<name>``              pose, and points in its frame with classes
+``faults/<sensor>``                  true faults of a reading, as JSON; empty without any
 ``world/lanes``                      borders of lanes, in each image as ``image/lanes``
 ``world/tracks``                     tracked points, in each image as ``image/tracks``
 ``world/occupancy``                  pose; ``voxels``: boxes of the voxels with a surface
@@ -43,6 +44,7 @@ from pydantic import Field
 from gen_data.core import capture, se3
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
+from gen_data.core.serialization import canonical_json
 from gen_data.core.skeletons import Skeleton, find_skeleton
 from gen_data.exporters import (
     base,
@@ -68,6 +70,7 @@ class Rerun(base.ExporterBase):
     """
 
     type: Literal["rerun"] = "rerun"
+    shows_truth: ClassVar[bool] = True
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i + 0.5",
         box="left, top, right, bottom along the edges of pixels",
@@ -122,9 +125,11 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         for item in truth.objects
         if item.box3d_world is not None and not item.ignored
     }
+    faults = {name: canonical_json(found) for name, found in sample.capture.faults() if found}
     return {
         "index": sample.index,
         "split": sample.split,
+        **({"faults": faults} if faults else {}),
         "time_s": round(begins_s + sample.scene.time_s, 9),
         "boxes": [_box_row(seen[number]) for number in sorted(seen)],
         "rigs": {rig.name: _pose(sample.scene.rig_pose(rig.name)) for rig in sample.scene.rigs},
@@ -228,11 +233,20 @@ def _chunks(
     for name in info.lidars:
         if scans := _readings(rows, "lidars", name):
             yield from _lidar_chunks(info, name, scans)
+    for name in sorted({name for row in rows for name in row.get("faults", ())}):
+        yield _fault_chunk(info, name, rows)
 
 
 def _readings(rows: Sequence[Row], kind: str, sensor: str) -> list[Row]:
     """Rows of the samples that a sensor reads, with the fields of its reading."""
     return [{**row, **row[kind][sensor]} for row in rows if sensor in row[kind]]
+
+
+def _fault_chunk(info: DatasetInfo, name: str, rows: Sequence[Row]) -> Any:
+    import rerun as rr
+
+    texts = [row.get("faults", {}).get(name, "") for row in rows]
+    return _chunk(info, f"faults/{name}", rows, rr.TextDocument.columns(text=texts))
 
 
 def _box_chunk(info: DatasetInfo, rows: Sequence[Row]) -> Any:

@@ -1,7 +1,7 @@
 """Points on surfaces, followed over a sequence in every sensor."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
@@ -12,7 +12,6 @@ from pydantic import Field
 from gen_data.annotations.sight_lines import MIRRORED, SightLines, cast_rays, trace_sight_lines
 from gen_data.config.base_model import Strict
 from gen_data.core import capture, errors, interfaces, se3
-from gen_data.core.motion import Trajectory
 from gen_data.core.rolling_shutter_projection import camera_poses, project_moving_points
 from gen_data.core.sample import TRACK_STATES, EgoTruth, PointTracks, SensorTracks
 from gen_data.core.scene import Camera, Lidar, Scene
@@ -230,25 +229,7 @@ def _rolling_lines(
     points: SurfacePoints, scene: Scene, camera: Camera, p_body: se3.Array
 ) -> tuple[SightLines, se3.Array]:
     """Rays at the instants of the rows that show the points, and image coordinates [px]."""
-    p_world = points.in_world(scene, p_body)
-    movers = list(_movers(points, scene))
-
-    def world(delays_s: se3.Array) -> se3.Array:
-        places = p_world.copy()
-        for track, rows in movers:
-            R, t = track.poses(scene.time_s + delays_s[rows])
-            places[rows] = np.einsum("nij,nj->ni", R, p_body[rows], optimize=False) + t
-        return np.asarray(places)
-
+    world = points.moving(scene, p_body)
     _, image_px, delays_s = project_moving_points(scene, camera, world, len(p_body))
     _, eyes = camera_poses(scene, camera, delays_s)
     return SightLines(eyes, world(delays_s), delays_s), image_px
-
-
-def _movers(points: SurfacePoints, scene: Scene) -> Iterator[tuple[Trajectory, slice]]:
-    """Trajectories of the bodies with points, and their rows."""
-    tracks = {track.body: track for track in scene.tracks}
-    for number, rows in points.by_body():
-        track = tracks.get(scene.bodies[number].name)
-        if track is not None:
-            yield track, rows

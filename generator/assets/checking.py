@@ -107,13 +107,16 @@ def _inspect_plate(one: IndexedAsset, library: Library, doubts: tuple[str, ...])
     plate = library.plate(one.asset_id)
     library.environment(one.asset_id)
     (_, left_px), (_, right_px) = plates.horizon_px(plate)
-    source = "given"
+    source = ""
     if plate.estimated:
-        source = f"estimated to {math.degrees(plate.horizon_error_rad):.2f} deg"
+        # Two standard deviations.
+        source = f" (estimated within {2.0 * math.degrees(plate.horizon_error_rad):.1f} deg)"
+    tilt_deg, roll_deg = map(math.degrees, plates.tilt_and_roll(plate))
     hfov = math.degrees(2.0 * math.atan(0.5 * plate.size_px[0] / plate.focal_px))
     _, (length_m, width_m) = plates.ground_rectangle(plate)
     note = (
-        f"horizon from row {left_px:.0f} to row {right_px:.0f} px ({source}), hfov {hfov:.1f} deg, "
+        f"horizon from row {left_px:.0f} to row {right_px:.0f} px, camera looks down "
+        f"{tilt_deg:.1f} deg and rolls {roll_deg:.1f} deg{source}, hfov {hfov:.1f} deg, "
         f"room for things {length_m:.1f} m x {width_m:.1f} m"
     )
     return Finding(one.asset_id, one.kind, "", note=note, warnings=doubts)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -26,6 +27,7 @@ from yaml.events import (
 from gen_data.config.distributions.base import DISTRIBUTIONS
 from gen_data.config.problems import FieldPath, Position, Problems, format_path, refuse
 from gen_data.config.yaml_scalars import PlainScalar, abbreviate, quote_value, resolve_scalar
+from gen_data.core.bounded_cache import CountCache
 from gen_data.core.errors import ConfigError, did_you_mean
 
 MAX_FILE_BYTES = 1024 * 1024
@@ -125,7 +127,13 @@ def load_yaml(path: Path) -> Node:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError:
         raise ConfigError(f"{str(path)!r}: is no file name") from None
-    return parse_yaml(_decode(data, str(path)), str(path))
+    # Pages and tests read the same templates again and again.
+    name = f"{path}:{blake2b(data).hexdigest()}"
+    return _LOADED.get(name, lambda: parse_yaml(_decode(data, str(path)), str(path)))
+
+
+_LOADED: CountCache[Node] = CountCache(16)
+"""Trees of the latest files, by path and content."""
 
 
 def parse_yaml(text: str, file: str) -> Node:

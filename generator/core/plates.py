@@ -144,6 +144,14 @@ def horizon_px(plate: Plate) -> tuple[PointPx, PointPx]:
     return (0.0, rows[0]), (float(width_px), rows[1])
 
 
+def tilt_and_roll(plate: Plate) -> tuple[float, float]:
+    """How far the camera looks down, and how the horizon falls to the right [rad]."""
+    up = plate.T_world_camera.inverse().rotate(np.array([0.0, 0.0, 1.0]))
+    (left_px, left_row), (right_px, right_row) = horizon_px(plate)
+    slope = math.atan((right_row - left_row) / (right_px - left_px))
+    return math.asin(-float(up[2])), slope
+
+
 def ground_points(plate: Plate, points_px: Array) -> Array:
     """Points of the ground, world [m], [n, 2], that image points [n, 2] show.
 

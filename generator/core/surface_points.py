@@ -4,7 +4,7 @@ A body that changes its mesh, such as a person who walks, carries its points alo
 have the same triangles; otherwise they keep their places in the body's frame.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,6 +78,25 @@ class SurfacePoints:
         t = np.array([p.translation_m for p in poses])
         turned = np.einsum("nij,nj->ni", R[inverse], p_body, optimize=False)
         return np.asarray(turned + t[inverse])
+
+    def moving(self, scene: Scene, p_body: se3.Array) -> Callable[[se3.Array], se3.Array]:
+        """World coordinates [m] of ``on_bodies``, [n, 3], as a function of delays [s], [n].
+
+        Delays count from the scene's time. Meshes remain as they are then; bodies move.
+        """
+        p_world = self.in_world(scene, p_body)
+        tracks = {track.body: track for track in scene.tracks}
+        bodies = ((tracks.get(scene.bodies[k].name), rows) for k, rows in self.by_body())
+        movers = [(track, rows) for track, rows in bodies if track is not None]
+
+        def places(delays_s: se3.Array) -> se3.Array:
+            found = p_world.copy()
+            for track, rows in movers:
+                R, t = track.poses(scene.time_s + delays_s[rows])
+                found[rows] = np.einsum("nij,nj->ni", R, p_body[rows], optimize=False) + t
+            return np.asarray(found)
+
+        return places
 
 
 def find_surface_points(

@@ -34,11 +34,12 @@ from gen_data.core.sample import (
     Occupancy,
     Sample,
     SensorTracks,
+    TextTruth,
 )
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.exporters import label_parts
 from gen_data.exporters.label_colors import id_color
-from gen_data.preview import overlay, sensor_views
+from gen_data.preview import overlay, sensor_views, text_view
 
 TIMELINE = "sample"
 TIME = "time"
@@ -150,10 +151,7 @@ class Recorder:
 
     def _record_faults(self, capture: Capture) -> None:
         """Log the true faults of all readings that have some, as text."""
-        faults = {name: reading.faults for name, reading in capture.readings.items()}
-        faults |= {name: cloud.faults for name, cloud in capture.clouds.items()}
-        faults |= {name: table.faults for name, table in capture.tables.items()}
-        for name, found in sorted(faults.items()):
+        for name, found in capture.faults():
             if found:
                 text = serialization.canonical_json(found)
                 self.stream.log(f"faults/{name}", rr.TextDocument(text))
@@ -247,6 +245,8 @@ class Recorder:
         self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
         if truth.borders is not None:
             self.stream.log(f"{path}/image/lanes", lane_strips_2d(truth.borders))
+        if truth.texts is not None:
+            self.stream.log(f"{path}/image/texts", text_strips(truth.texts))
         self._record_keypoints(f"{path}/image/keypoints", truth)
 
     def _record_keypoints(self, path: str, truth: ImageTruth) -> None:
@@ -448,6 +448,18 @@ def lane_strips_2d(borders: Sequence[BorderTruth]) -> rr.LineStrips2D:
         [line for _, _, line in parts],
         colors=[label_parts.border_color(kind, visible=seen) for kind, seen, _ in parts],
         radii=[label_parts.BORDER_RADII[seen] for _, seen, _ in parts],
+    )
+
+
+def text_strips(texts: Sequence[TextTruth]) -> rr.LineStrips2D:
+    """Convert words in an image: outlines with the text, in the colours of ``text_view``."""
+    words = [word for text in texts for word in text.words if word.visible_fraction > 0.0]
+    return rr.LineStrips2D(
+        [[*word.quad_px, word.quad_px[0]] for word in words],
+        colors=[text_view.word_color(word) for word in words],
+        labels=[word.text for word in words],
+        show_labels=False,
+        radii=-1.0,
     )
 
 

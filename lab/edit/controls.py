@@ -25,6 +25,8 @@ SECTIONS = ("elements", "randomizers", "sensors")
 GENERAL = "general"
 """Stands for the fields of a configuration outside of these sections."""
 RANGES = ("uniform", "log_uniform", "uniform_integer")
+BEYOND = 1000.0
+"""Legal values this many times as large as the value do not stretch its slider."""
 HIDDEN = frozenset({"type", "name"})
 BINS = 24
 DRAWS = 2000
@@ -172,13 +174,15 @@ def _extent(
     limits = next((one.limits for one in (field, *field.branches) if one.limits), None)
     largest = max((abs(number) for number in numbers), default=0.0) or 1.0
     low, high = (-math.inf, math.inf) if limits is None else (limits.low, limits.high)
-    # A whole turn of angles; else multiples of the value, and all that is legal if that is little.
+    # All that is legal; without a limit, or with one beyond use, a whole turn of angles, and
+    # multiples of other values.
     reach = 360.0 if is_angle else 4.0 * largest
-    low = low if low >= -reach * 5 else -reach
-    high = high if high <= reach * 5 else reach
+    low = low if low >= -largest * BEYOND else -reach
+    high = high if high <= largest * BEYOND else reach
     whole = form == "uniform_integer" or field.schema.get("type") == "integer"
     whole = whole or any(one.schema.get("type") == "integer" for one in field.branches)
-    step = 1.0 if whole else 10.0 ** math.floor(math.log10(max(high - low, 1e-6) / 100.0))
+    fine = max(min(high - low, 8.0 * largest), 1e-6)  # Small values of a wide range can be set.
+    step = 1.0 if whole else 10.0 ** math.floor(math.log10(fine / 100.0))
     low = low + step if limits is not None and limits.open_low and low == limits.low else low
     low = round(math.ceil(low / step - 1e-9) * step, 12)  # Sliders count steps from there.
     high = high - step if limits is not None and limits.open_high and high == limits.high else high

@@ -44,6 +44,8 @@ class Desk:
         gallery: Pictures of shipped configurations by file name.
         listeners: Receivers of results by client of the workers.
         schema: Loads all plug-ins, which takes seconds and must not hold up the page.
+        reports: Names of reports of fits in addresses, by path.
+        scratch: Folder for dropped files and temporary ones, which ends with the server.
         hearers: Receivers of the activities for a client.
     """
 
@@ -53,11 +55,13 @@ class Desk:
     token: str
     pictures: Pictures = field(default_factory=Pictures)
     gallery: dict[str, bytes] = field(default_factory=dict)
+    reports: dict[str, str] = field(default_factory=dict)
     listeners: dict[str, Callable[[Ticket, Any], None]] = field(default_factory=dict)
     hearers: dict[str, Callable[[Activity], None]] = field(default_factory=dict)
     schema: asyncio.Task[Any] | None = None
     loop: asyncio.AbstractEventLoop | None = None
     workers: Workers | None = None
+    scratch: Path | None = None
 
     def deliver(self, ticket: Ticket, result: Any) -> None:
         """Hand a result to its tab, in the loop of the server."""

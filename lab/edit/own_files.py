@@ -7,6 +7,7 @@ or the walls of its room. Both are copied to ``assets/`` next to the configurati
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ from gen_data.assets.folder_index import PlateEntry
 from gen_data.assets.plates.plate_import import locate_camera
 from gen_data.config.merging import node_name
 from gen_data.core.errors import AssetError, ConfigError, StorageError
-from gen_data.core.plates import Plate, ground_points
+from gen_data.core.plates import Plate, ground_points, tilt_and_roll
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.core.whole_files import write_whole
 from gen_data.lab.edit import photographs, text_edits
@@ -59,6 +60,7 @@ class Checked:
             photograph with its horizon and a grid on its ground.
         size_px: Width and height of a photograph; None for a mesh.
         standpoint: That the entry of a photograph follows from.
+        tilt_roll_deg: How far the camera of a photograph looks down, and the slope of its horizon.
     """
 
     section: str
@@ -67,6 +69,7 @@ class Checked:
     jpeg: bytes
     size_px: tuple[int, int] | None = None
     standpoint: Standpoint = photographs.UNKNOWN
+    tilt_roll_deg: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,7 @@ class Misplaced:
     jpeg: bytes
     size_px: tuple[int, int]
     standpoint: Standpoint
+    tilt_roll_deg: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -159,6 +163,7 @@ def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked
         return locate_camera(entry, data, rgb, name)
 
     plate, standpoint = _with_ground(locate, standpoint)
+    tilt_deg, roll_deg = (round(math.degrees(one), 1) for one in tilt_and_roll(plate))
     try:
         checked = _check(folder, "plates", standpoint.entry(name, data, size_px))
     except AssetError as error:
@@ -168,8 +173,10 @@ def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked
         text = str(error) if is_below else f"{name}: {photographs.remedy(plate, ground)}"
         shown_px = [(x * size_px[0], y * size_px[1]) for x, y in lowered or ()]
         jpeg = encode(_shrink(plate_overlay(replace(plate, ground_px=tuple(shown_px)), rgb)))
-        return Misplaced(text, jpeg, size_px, standpoint)
-    return replace(checked, size_px=size_px, standpoint=standpoint)
+        return Misplaced(text, jpeg, size_px, standpoint, (tilt_deg, roll_deg))
+    return replace(
+        checked, size_px=size_px, standpoint=standpoint, tilt_roll_deg=(tilt_deg, roll_deg)
+    )
 
 
 def _with_ground(

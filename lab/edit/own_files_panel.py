@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
+import shutil
+import tempfile
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from gen_data.core.errors import ConfigError, GenDataError
-from gen_data.core.temporary_folders import TemporaryFolder
 from gen_data.lab.edit import own_files
 from gen_data.lab.edit.photographs import GROUND, UNKNOWN, Corners, Standpoint, rectangle
 
@@ -20,11 +21,13 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.panels import Tab
 
 ASSUMED = (
-    "\nno horizon was found: change 'looks down' until the grid lies on the table or the ground"
+    "\nnot sure how the camera looked, as no edges confirm a horizon: set 'looks down' "
+    "and 'roll' until the grid lies on the table or the ground"
 )
 SHORTENED = "\nthe ground ends below the horizon: if the grid is tilted, change 'looks down'"
 HEIGHT_HINT = "of the lens; small squares of the grid are 0.1 m"
 TILT_HINT = "0: level; 30: from a chair; 60: standing at the table"
+ROLL_HINT = "the horizon falls to the right; negative: to the left"
 HFOV_HINT = "phones: 65 held level, 51 upright"
 REACH = 0.2
 """Distance from a corner at which it is taken, as a share of the picture's edges."""
@@ -66,12 +69,11 @@ class OwnFilesPanel:
         if not name:
             ui.notify("the file has no name that could be kept", type="negative")
             return
-        folder = TemporaryFolder("edit")
-        self._tab.scratch.append(folder)
-        await event.file.save(folder.path / name)
+        folder = Path(tempfile.mkdtemp(dir=self._tab.desk.scratch))
+        await event.file.save(folder / name)
         event.sender.reset()  # Its own list of files says nothing that the card does not.
         with self._body:
-            OwnFile(self._tab, folder.path / name)
+            OwnFile(self._tab, folder / name)
 
 
 class OwnFile:
@@ -87,6 +89,9 @@ class OwnFile:
         self._is_checked = asyncio.Event()
         self._is_seen = False
         self._ranges: list[Any] = []
+        self._numbers: dict[str, Any] = {}
+        self._tilt_deg, self._roll_deg = 0.0, 0.0  # Of the latest check.
+        self._is_showing = False
         self._card = ui.element("div").classes("gd-field")
         self._card.props["data-file"] = path.name
         self._jobs = f"{tab.key}/file/{path}"
@@ -127,6 +132,7 @@ class OwnFile:
         if has_picture and found.size_px is not None:
             scale = own_files.PHOTO_PX / max(found.size_px)
             self._size_px = (scale * found.size_px[0], scale * found.size_px[1])
+            self._tilt_deg, self._roll_deg = found.tilt_roll_deg
             self._take_over(found.standpoint)
         if self._found or is_photograph:
             self._build_choices()
@@ -134,8 +140,9 @@ class OwnFile:
             self._scroll()
 
     def _remove(self) -> None:
-        """Take the card away; the text stays as it is."""
+        """Take the card and the copy of its file away; the text stays as it is."""
         self._tab.desk.forget(self._jobs)
+        shutil.rmtree(self._path.parent, ignore_errors=True)
         self._card.delete()
 
     def _take_over(self, used: Standpoint) -> None:
@@ -150,6 +157,7 @@ class OwnFile:
         if self._taken is None:
             self._corners = used.ground or GROUND
             self._draw_corners()
+            self._show_angles()
             for axis, one in enumerate(self._ranges):
                 one.value = self._extent(axis)
 
@@ -198,12 +206,14 @@ class OwnFile:
             for field, label, hint, value in (
                 ("height_m", "camera above table or ground [m]", HEIGHT_HINT, now.height_m),
                 ("tilt_deg", "looks down [deg], empty: from edges", TILT_HINT, now.tilt_deg),
+                ("roll_deg", "roll [deg]", ROLL_HINT, self._roll_deg),
                 ("hfov_deg", "field of view across [deg], empty: EXIF", HFOV_HINT, now.hfov_deg),
             ):
                 number = ui.number(
                     label, value=value, on_change=lambda e, field=field: self._stand(field, e.value)
                 ).props(f'dense debounce=300 data-standpoint="{field}"')
                 number.style("width: 250px").props["hint"] = hint
+                self._numbers[field] = number
         for axis, label in enumerate(
             ("ground from left to right [%]", "ground from top to bottom [%]")
         ):
@@ -218,6 +228,16 @@ class OwnFile:
                     leading_events=False,
                 )
             )
+
+    def _show_angles(self) -> None:
+        """Show tilt and roll of the check, where they were not given."""
+        self._is_showing = True
+        is_given = self._standpoint.tilt_deg is not None
+        shown = self._standpoint.roll_deg if is_given else self._roll_deg
+        for field, value in (("tilt_deg", self._standpoint.tilt_deg), ("roll_deg", shown)):
+            if field in self._numbers:
+                self._numbers[field].value = value
+        self._is_showing = False
 
     def _extent(self, axis: int) -> dict[str, float]:
         """Ends of the ground's corners along an axis [%]."""
@@ -262,9 +282,18 @@ class OwnFile:
         )
 
     def _stand(self, field: str, value: Any) -> None:
-        if value is None and field == "height_m":
+        if value is None and field in ("height_m", "roll_deg"):
             return
-        self._standpoint = replace(self._standpoint, **{field: value})
+        old = self._standpoint
+        new = replace(old, **{field: value})
+        if old.tilt_deg is None and field in ("tilt_deg", "roll_deg"):
+            # Both are given, or none: the other one is as it was found.
+            found = {"tilt_deg": self._tilt_deg, "roll_deg": self._roll_deg}
+            new = replace(old, **{**found, field: value})
+        if self._is_showing or new == old:
+            return
+        self._standpoint = new
+        self._show_angles()
         self._check(own_files.CheckFile(self._path, standpoint=self._standpoint))
 
     async def _add(self, *, walls: bool = False) -> None:

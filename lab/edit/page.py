@@ -14,12 +14,11 @@ from urllib.parse import quote
 
 from nicegui import context, ui
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import FileResponse, JSONResponse, Response
 
 from gen_data.assemble.documents import shipped_text
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import GenDataError
-from gen_data.core.temporary_folders import TemporaryFolder
 from gen_data.lab.edit import completion
 from gen_data.lab.edit.browse_page import BrowsePage
 from gen_data.lab.edit.data_sets import is_data_set
@@ -33,8 +32,9 @@ from gen_data.lab.edit.panels import (
     home_link,
     show_full,
 )
+from gen_data.lab.edit.photographs import is_empty
 from gen_data.lab.edit.samples import Check, Shown
-from gen_data.lab.edit.session import EACH, SLOTS, Session, Variation
+from gen_data.lab.edit.session import BEGIN, BEGINNINGS, EACH, SLOTS, Session, Variation
 from gen_data.lab.edit.start_page import StartPage
 from gen_data.lab.edit.workers import Activity, Refused, Ticket
 
@@ -61,6 +61,11 @@ def add_routes(app: Any, desk: Desk) -> None:
         if data is None:
             return Response(status_code=404)
         return Response(data, media_type="image/jpeg")
+
+    @app.get("/edit/report/{name}")  # type: ignore[untyped-decorator]
+    def report(name: str) -> Response:
+        path = next((path for path, known in desk.reports.items() if known == name), None)
+        return FileResponse(path) if path else Response(status_code=404)
 
     @app.post("/edit/complete")  # type: ignore[untyped-decorator]
     async def complete(request: Request) -> Response:
@@ -137,7 +142,6 @@ class EditorTab:
         self._orders: list[Any] = []
         self._tiles: list[Tile] = []
         self.chosen: Shown | None = None
-        self.scratch: list[TemporaryFolder] = []
 
     def build(self) -> None:
         """Make all widgets, and begin."""
@@ -159,7 +163,7 @@ class EditorTab:
             with ui.element("section").classes("gd-right").props('aria-label="Samples"'):
                 self._build_view_bar()
                 self._busy = ui.label("").classes("gd-busy").props('role="status"')
-                self._grid = ui.element("div").classes("gd-grid")
+                self._grid = ui.element("div").classes("gd-grid").props("data-grid=pictures")
                 self._build_panels()
         ui.add_body_html('<script type="module" src="/edit/editor.js"></script>')
         ui.on("gd-line", self._moved)
@@ -283,10 +287,12 @@ class EditorTab:
         checks = [Check(orders[0].text, orders[0].file)] if orders else []
         self.desk.order(f"{self.key}/check", checks, self._receive_check)
         self._orders = orders or self._orders
-        if orders and not self.session.results:
-            self._busy.text = "starting a process that renders ..."
-        elif not orders:
+        if not orders:
             self._busy.text = ""
+        elif self.session.results:
+            self._busy.text = f"drawing {len(orders)} samples ..."
+        else:
+            self._busy.text = "starting a process that renders ..."
         self._show_tiles()
 
     def _receive(self, ticket: Ticket, result: Shown | Refused) -> None:
@@ -313,7 +319,8 @@ class EditorTab:
         varied = self.session.grid.variation
         if varied is None or slot >= len(varied.values):
             return ""
-        return f"{varied.field.rpartition('.')[2]}: {to_flow_yaml(varied.values[slot])}"
+        name = varied.field.rpartition(".")[2]
+        return f"sample {varied.index}, {name}: {to_flow_yaml(varied.values[slot])}"
 
     def _show_tiles(self) -> None:
         while len(self._tiles) > max(len(self._orders), 1):
@@ -321,6 +328,8 @@ class EditorTab:
         with self._grid:
             while len(self._tiles) < len(self._orders):
                 self._tiles.append(Tile(len(self._tiles), self._open_full))
+        width_px, height_px = self.session.size_px
+        self._grid.style(f"--gd-shape: {width_px} / {height_px}")
         for k, tile in enumerate(self._tiles):
             tile.mark(k in self.session.outdated)
 
@@ -328,6 +337,8 @@ class EditorTab:
         faults = self.session.faults
         self._faults.clear()
         with self._faults:
+            if is_empty(self.session.text):
+                self._show_beginnings()
             for fault in faults[:30]:
                 with (
                     ui.element("button")
@@ -341,6 +352,15 @@ class EditorTab:
         )
         count = len(faults)
         self._state.text = f"{count} fault{'s' * (count != 1)}" if count else self._saved_words()
+
+    def _show_beginnings(self) -> None:
+        """Show how an empty file begins."""
+        ui.label(BEGIN).classes("gd-begin")
+        with ui.element("div").classes("gd-row"):
+            for name in BEGINNINGS:
+                ui.button(
+                    f"extends: {name}", on_click=partial(self.edit, f"extends: {name}\n")
+                ).props("dense no-caps outline size=sm")
 
     def _saved_words(self) -> str:
         return "not saved" if self.session.is_changed else "saved"
@@ -392,21 +412,30 @@ class EditorTab:
         ui.run_javascript(f"window.genDataEdit.forget({f'gen-data:{self.session.name}'!r})")
 
     def _refuse_save(self, text: str) -> None:
-        with self.client.content, ui.dialog(value=True), ui.card():
+        with self.client.content, ui.dialog(value=True) as dialog, ui.card().classes("gd-dialog"):
+
+            def reload() -> None:
+                self._reload()
+                dialog.close()
+
+            async def overwrite() -> None:
+                await self._save(overwrite=True)
+                dialog.close()
+
             ui.label(text)
             with ui.element("div").classes("gd-row"):
-                ui.button("Reload the file", on_click=self._reload).props("no-caps flat")
-                ui.button("Overwrite", on_click=partial(self._save, overwrite=True)).props(
-                    "no-caps outline"
-                )
+                ui.button("Reload the file", on_click=reload).props("no-caps flat")
+                ui.button("Overwrite", on_click=overwrite).props("no-caps outline")
+                ui.button("Cancel", on_click=dialog.close).props("no-caps flat")
 
     def _reload(self) -> None:
         self.session.file = read_file(self.session.file.path)
         self.edit(self.session.file.text)
 
     def _save_as(self) -> None:
-        with self.client.content, ui.dialog(value=True), ui.card():
-            name = ui.input("File", value=self.session.file.path.name).style("width: 60vw")
+        with self.client.content, ui.dialog(value=True) as dialog, ui.card().classes("gd-dialog"):
+            name = ui.input("File", value=self.session.file.path.name).props("autofocus")
+            name.style("width: 100%")
 
             def save() -> None:
                 old, path = self.session.name, Path(name.value).expanduser()
@@ -421,13 +450,13 @@ class EditorTab:
                 ui.navigate.to(f"/?open={quote(self.session.name)}")
 
             name.on("keydown.enter", save)
-            ui.button("Save", on_click=save).props("no-caps outline")
+            with ui.element("div").classes("gd-row"):
+                ui.button("Save", on_click=save).props("no-caps outline")
+                ui.button("Cancel", on_click=dialog.close).props("no-caps flat")
 
     def _leave(self) -> None:
         TABS.pop(self.key, None)
         self.desk.forget(self.key)
-        for folder in self.scratch:
-            folder.remove()
         self._task.cancel()
 
 
@@ -442,8 +471,9 @@ class Tile:
         )
         self._button.on("click", lambda: open_full(slot))
         with self._button:
-            self._image = ui.element("img").props('alt=""')
-            self._refused = ui.label().classes("gd-refused")
+            with ui.element("div").classes("gd-frame"):
+                self._image = ui.element("img").props('alt=""')
+                self._refused = ui.label().classes("gd-refused")
             with ui.element("small"):
                 self._caption = ui.label("...")
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import secrets
 import sys
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -15,7 +17,6 @@ from nicegui import ui
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core import processes
 from gen_data.core.errors import ConfigError, GenDataError
-from gen_data.core.temporary_folders import TemporaryFolder
 from gen_data.lab.edit import controls, statistics
 from gen_data.lab.edit.document import list_origins
 from gen_data.lab.edit.samples import Recording
@@ -36,7 +37,6 @@ class Tab(Protocol):
         client: Its connection to a browser.
         base: The sample that `vary` changes; None without pictures.
         chosen: The sample that the user has chosen for it.
-        scratch: Folders that are removed with the tab.
     """
 
     key: str
@@ -44,7 +44,6 @@ class Tab(Protocol):
     session: Session
     client: Any
     chosen: Shown | None
-    scratch: list[TemporaryFolder]
 
     @property
     def base(self) -> Shown | None: ...  # noqa: D102
@@ -324,6 +323,8 @@ class StatisticsPanel:
     def __init__(self, tab: Tab) -> None:
         self._tab = tab
         self._real: statistics.Summary | None = None
+        self._process: asyncio.subprocess.Process | None = None
+        tab.client.on_delete(self._end_fit)
         self._note = ui.label("")
         if tab.desk.real is not None:
             with ui.element("div").classes("gd-row"):
@@ -333,6 +334,10 @@ class StatisticsPanel:
                 self._scenes = ui.number(
                     "scenes to simulate", value=SCENES, min=LEAST, step=1, precision=0
                 ).props('dense data-fit="scenes"')
+                self._cancel = ui.button("Cancel", on_click=self._end_fit).props(
+                    "dense no-caps flat"
+                )
+                self._cancel.set_visibility(False)
             self._progress = ui.label("").props('role="status"')
             self._result = ui.element("div")
             ui.timer(0.0, self._read, once=True)
@@ -387,18 +392,39 @@ class StatisticsPanel:
             "--scenes",
             str(int(self._scenes.value or SCENES)),
         )
-        self._progress.text = "fitting; this takes some minutes ..."
-        process = await asyncio.create_subprocess_exec(
-            *processes.tie(command), stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
-        )
-        _, said = await process.communicate()
-        if process.returncode:
-            self._progress.text = said.decode(errors="replace").strip()[-500:]
+        if self._process is not None:
             return
-        self._progress.text = f"wrote {out.name}, its report {out.with_suffix('.html').name}"
         self._result.clear()
-        with self._result:
+        self._progress.text = "fitting; this takes some minutes ..."
+        self._cancel.set_visibility(True)
+        self._process = process = await asyncio.create_subprocess_exec(
+            *processes.tie(command),
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        assert process.stderr is not None
+        said: deque[str] = deque(maxlen=12)
+        async for line in process.stderr:
+            said.append(line.decode(errors="replace").rstrip())
+            self._progress.text = f"fitting: {said[-1]}"
+        failed = await process.wait()
+        is_ended, self._process = self._process is None, None
+        self._cancel.set_visibility(False)
+        if failed:
+            self._progress.text = "the fit was cancelled" if is_ended else "\n".join(said)[-500:]
+            return
+        report = out.with_suffix(".html")
+        self._progress.text = f"wrote {out.name}"
+        with self._result, ui.element("div").classes("gd-row"):
             ui.link(f"open {out.name}", f"/?open={quote(str(out))}")
+            address = self._tab.desk.reports.setdefault(str(report), secrets.token_urlsafe(12))
+            ui.link(f"report {report.name}", f"/edit/report/{address}", new_tab=True)
+
+    def _end_fit(self) -> None:
+        """End the process of the fit, which then has written nothing."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
 
 
 class ResolvedPanel:
@@ -441,8 +467,22 @@ def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
                         ui.label(cell)
 
 
+def object_rows(shown: Shown) -> list[tuple[str, str, str, str]]:
+    """Class, name, size and occlusion of the objects of a picture."""
+    return [
+        (
+            o.category,
+            o.name,
+            f"{o.width_px:.0f} x {o.height_px:.0f}",
+            "" if o.occlusion is None else f"{o.occlusion:.2f}",
+        )
+        for o in shown.objects
+    ]
+
+
 def show_full(tab: Tab, order: Order, shown: Shown) -> None:
     """Show a sample in full size with its draws."""
+    shape = tab.session.size_px
     with ui.dialog(value=True).props("maximized") as dialog, ui.card().style("width: 100%"):
         with ui.element("div").classes("gd-row"):
             ui.label(f"sample {shown.index}").classes("gd-name")
@@ -455,20 +495,10 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
             )
         with ui.element("div").classes("gd-full"):
             image = ui.element("img").props(f'alt="sample {shown.index}"')
+            image.style(f"aspect-ratio: {shape[0]} / {shape[1]}; width: {shape[0]}px")
             state = ui.label("rendering ...")
         with ui.element("div").classes("gd-table"):
-            table(
-                ("class", "object", "size px", "occlusion"),
-                [
-                    (
-                        o.category,
-                        o.name,
-                        f"{o.width_px:.0f} x {o.height_px:.0f}",
-                        "" if o.occlusion is None else f"{o.occlusion:.2f}",
-                    )
-                    for o in shown.objects
-                ],
-            )
+            objects = ui.element("div")
             table(
                 ("parameter", "drawn"),
                 [
@@ -487,6 +517,9 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
         if jpeg:
             image.props["src"] = tab.desk.pictures.put(jpeg)
             image.update()
+            # Of the configured image: a small picture has other sizes, and misses small objects.
+            with objects:
+                table(("class", "object", "size px", "occlusion"), object_rows(result))
 
     tab.desk.order(f"{tab.key}/full", [replace(order, width_px=0)], receive)
 

@@ -73,15 +73,18 @@ class Standpoint:
     Attributes:
         height_m: Height of the camera above the ground, which may be the top of a table.
         tilt_deg: How far it looks down; None = found from straight edges.
-        hfov_deg: Horizontal field of view; None = of the EXIF data, else ``HFOV_DEG``.
+        hfov_deg: Horizontal field of view; None = of the EXIF data, else found with the tilt; with
+            a given tilt, ``HFOV_DEG``.
         ground: Corners of the ground, shares of the photograph's width from the left and height
             from the top; None = ``GROUND``, without its part above the horizon.
+        roll_deg: Slope of the horizon, which falls to the right; only with a tilt.
     """
 
     height_m: float = 0.5
     tilt_deg: float | None = None
     hfov_deg: float | None = None
     ground: Corners | None = None
+    roll_deg: float = 0.0
 
     def entry(self, name: str, data: bytes, size_px: tuple[int, int]) -> dict[str, Any]:
         """Entry of the photograph under ``plates`` of an index.
@@ -96,13 +99,16 @@ class Standpoint:
         width_px, height_px = size_px
         focal_px = None if self.hfov_deg else exif_focal_px(data, *size_px)
         entry: dict[str, Any] = {"file": name, "camera_height_m": self.height_m}
-        if focal_px is None:
+        if focal_px is None and (self.hfov_deg or self.tilt_deg is not None):
             hfov_deg = self.hfov_deg or _assumed_hfov_deg(width_px / max(size_px))
             entry["hfov_deg"] = hfov_deg
             focal_px = 0.5 * width_px / math.tan(math.radians(0.5 * hfov_deg))
-        if self.tilt_deg is not None:
-            row_px = 0.5 * height_px - focal_px * math.tan(math.radians(self.tilt_deg))
+        if self.tilt_deg is not None and focal_px is not None:
+            rise_px = focal_px * math.tan(math.radians(self.tilt_deg))
+            row_px = 0.5 * height_px - rise_px / math.cos(math.radians(self.roll_deg))
             entry["horizon"] = {"height_px": round(row_px, 1)}
+            if self.roll_deg:
+                entry["horizon"]["roll_deg"] = self.roll_deg
         corners = self.ground or GROUND
         entry["ground"] = [[round(x * width_px), round(y * height_px)] for x, y in corners]
         return entry

@@ -20,7 +20,7 @@ import numpy as np
 from gen_data.annotations.annotate import annotate_reading
 from gen_data.assemble import plugin_tables
 from gen_data.assemble.config import parse_config
-from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assemble.pipeline_factory import PipelineFactory, nominal_scene, pipeline_config
 from gen_data.config.distributions import Constant
 from gen_data.config.schema import to_plain_yaml
 from gen_data.core import errors, optional_packages, plates
@@ -30,7 +30,10 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.lab.edit.document import Fault, analyse
 from gen_data.lab.edit.overlays import KINDS, LAYERS, View, draw_view, first_kind
+from gen_data.lab.edit.reuse import Memory, RememberingPhysics
 from gen_data.packs.provision import open_assets
+from gen_data.physics import open_engine
+from gen_data.pipeline import Pipeline
 from gen_data.report.drawn_parameters import Draw, observe_randomizer, shared_draws
 from gen_data.report.image_statistics import measure_look
 
@@ -41,7 +44,7 @@ if TYPE_CHECKING:
     from gen_data.core.sample import Sample
     from gen_data.core.scene import Scene
     from gen_data.core.streams import Rng, Streams
-    from gen_data.pipeline import Pipeline
+    from gen_data.pipeline.pipeline import AcceptedScene
     from gen_data.preview.overlay import Image
 
 TEXTS_KEPT = 4
@@ -158,7 +161,7 @@ class Studio:
     """Renders orders in one process; keeps assets, engines, pipelines and the latest samples."""
 
     def __init__(self) -> None:
-        self._libraries: CountCache[tuple[Library, CountCache[Renderer]]] = CountCache(2)
+        self._libraries: CountCache[tuple[Library, CountCache[Renderer], Memory]] = CountCache(2)
         self._opened: CountCache[OpenedText] = CountCache(TEXTS_KEPT)
         self._taken: CountCache[Taken] = CountCache(SAMPLES_KEPT)
 
@@ -220,10 +223,10 @@ class Studio:
         )
         folders = config.asset_folders
         opened = repr([(folder, _index_time_ns(folder)) for folder in folders])
-        library, renderers = self._libraries.get(
-            opened, lambda: (open_assets(folders), CountCache(RENDERERS_KEPT))
+        library, renderers, memory = self._libraries.get(
+            opened, lambda: (open_assets(folders), CountCache(RENDERERS_KEPT), Memory())
         )
-        return OpenedText(config, library, renderers)
+        return OpenedText(config, library, renderers, memory)
 
 
 def _index_time_ns(folder: Path) -> int:
@@ -241,7 +244,9 @@ class OpenedText:
         sensors: First kind of picture by name of every sensor that has one.
     """
 
-    def __init__(self, config: Config, library: Library, renderers: CountCache[Renderer]) -> None:
+    def __init__(
+        self, config: Config, library: Library, renderers: CountCache[Renderer], memory: Memory
+    ) -> None:
         # Formats have no pictures: whether they can hold the data set is checked before a run.
         factory = PipelineFactory(replace(config, exporters=()), n=1)
         # Assets stay open from text to text, and in the renderer: both take longer than a sample.
@@ -249,8 +254,19 @@ class OpenedText:
         vars(factory)["renderer"] = renderers.get(repr(config.render), lambda: factory.renderer)
         self._config, self.library = config, library
         self._draws: dict[str, list[Draw]] = {}
-        self._pipeline: Pipeline = factory()
-        self._settings = self._pipeline.config
+        settings = config.general.physics
+        self._memory, self._nominal = memory, factory.nominal
+        self._physics = RememberingPhysics(open_engine(library, settings), repr(settings), memory)
+        self._settings = pipeline_config(config, library, 1, factory.categories, frozenset())
+        self._pipeline = Pipeline(
+            self._settings,
+            library,
+            open_physics=lambda: self._physics,
+            open_renderer=lambda: factory.renderer,
+        )
+        # Everything that a nominal scene depends on, and some more.
+        apart = ("randomizers", "annotations", "exporters", "render")
+        self._frame = repr({k: v for k, v in config.document.plain().items() if k not in apart})
         self._resources = ExitStack()
         self._resources.enter_context(self._pipeline)
         self.info = self._pipeline.info
@@ -301,7 +317,7 @@ class OpenedText:
             self._settings, open_scene=self._observed_scene, channels=needed, frame_truth=None
         )
         with pipeline.config.located_errors():
-            accepted = pipeline.accepted_scene(scene_index)
+            accepted = self._kept_scene(pipeline.accepted_scene(scene_index))
             drawn = pipeline.drawn_view(accepted, view_index)
             scene, factor = self._with_small_camera(drawn.scene, view.sensor, width_px)
             pipeline.config = replace(
@@ -338,10 +354,26 @@ class OpenedText:
         )
         return annotate_reading(scene, reading, annotators, smaller, self.library)
 
+    def _kept_scene(self, accepted: AcceptedScene) -> AcceptedScene:
+        """The same with the scene that an earlier text had: its views are known by this object."""
+        settings = ("finish", self.info.categories)
+        scene = self._memory.get(self._physics.latest, settings, lambda: accepted.scene)
+        return replace(accepted, scene=scene)
+
     def _observed_scene(self, streams: Streams) -> Any:
-        nominal, randomizers, sensors = self._settings.open_scene(streams)
-        self._draws["shared"] = list(shared_draws(self._config, nominal))
-        return nominal, [Observed(one, self._draws) for one in randomizers], sensors
+        config, shared = self._config, self._config.shared(streams)
+        # The first scene was read with the text. As text: 1, 1.0 and true are equal.
+        known = (one for one in config.probes if repr(one.shared) == repr(shared))
+        scene = next(known, None) or config.scene_config(shared)
+        built = dict(zip(map(id, config.probes), self._nominal, strict=True))
+        nominal = self._memory.get(
+            self.library,
+            (self._frame, repr(shared)),
+            lambda: built.get(id(scene)) or nominal_scene(config, scene, self.library),
+        )
+        self._draws["shared"] = list(shared_draws(config, nominal))
+        observed = [Observed(one, self._draws, self._memory) for one in scene.randomizers]
+        return nominal, observed, scene.sensors
 
     def _plain_draws(self) -> dict[str, tuple[Any, ...]]:
         found: dict[str, list[Any]] = {}
@@ -356,17 +388,22 @@ class Observed:
 
     motion_duration_s: float | None = None
 
-    def __init__(self, randomizer: Randomizer, draws: dict[str, list[Draw]]) -> None:
+    def __init__(
+        self, randomizer: Randomizer, draws: dict[str, list[Draw]], memory: Memory
+    ) -> None:
         self.name, self.stage = randomizer.name, randomizer.stage
-        self._log: list[Draw] = []
-        self._draws = draws
-        self._randomizer = observe_randomizer(randomizer, self._log)
+        self._randomizer, self._draws, self._memory = randomizer, draws, memory
 
     def __call__(self, scene: Scene, assets: AssetLibrary, rng: Rng) -> Scene:
-        """Apply the randomizer."""
-        self._log.clear()
-        self._draws[self.name] = self._log
-        return self._randomizer(scene, assets, rng)
+        """Apply the randomizer, unless it had the same scene and stream before."""
+
+        def draw() -> tuple[Scene, list[Draw]]:
+            log: list[Draw] = []
+            return observe_randomizer(self._randomizer, log)(scene, assets, rng), log
+
+        settings = (type(self._randomizer), repr(self._randomizer), rng.streams)
+        drawn, self._draws[self.name] = self._memory.get(scene, settings, draw)
+        return drawn
 
 
 def shrink(lens: Intrinsics, width_px: int) -> Intrinsics:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs
 
 from gen_data.core.errors import ConfigError
+from gen_data.core.temporary_folders import temporary_folder
 from gen_data.lab.edit.completion import root_schema
 from gen_data.lab.edit.workers import Workers
 
@@ -165,7 +166,10 @@ def serve(desk: Desk, host: str, port: int, workers: int, announce: Callable[[st
 
     waiting: list[asyncio.Task[None]] = []
     app.on_startup(start)
-    with Workers(workers, desk.deliver, desk.hear) as desk.workers:
+    with (
+        temporary_folder("edit") as desk.scratch,
+        Workers(workers, desk.deliver, desk.hear, desk.scratch) as desk.workers,
+    ):
         ui.run(
             lambda: page.build(desk),
             host=host,

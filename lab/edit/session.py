@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.workers import Ticket
 
 BEGIN = (
-    "nothing is here yet: type 'extends: ' and choose a name, such as tabletop.yaml, or drop a "
-    "photograph on 'Own files'"
+    "Nothing is here yet. Begin with a shipped configuration, whose name completes what you type "
+    "behind 'extends: ', or drop a photograph on 'Own files'."
 )
+BEGINNINGS = ("tabletop.yaml", "rooms.yaml", "street.yaml", "photo_plates.yaml")
+"""Configurations that an empty file is offered."""
 SLOTS = (4, 6, 8, 12, 16, 24)
 EACH = ("scene", "view", "step")
 """What differs from one picture to the next."""
@@ -111,7 +113,7 @@ class Session:
         """
         self.text = text
         if is_empty(text):
-            self.analysis = Analysis(None, (Fault(1, 1, f"{self.name}:1:1: {BEGIN}"),))
+            self.analysis = Analysis(None)
             return
         try:
             self.folders.refuse_outside(text, self.name)
@@ -162,6 +164,15 @@ class Session:
         """Pictures of the current text, in their order."""
         results = sorted(self.results.items())
         return [r for k, r in results if isinstance(r, Shown) and k not in self.outdated]
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Shape of the pictures to come: of the camera that is shown, else of the first one."""
+        sensors = self.config.probes[0].sensors if self.config else ()
+        sized = [one for one in sensors if getattr(one, "size_px", None)]
+        wanted = [one for one in sized if one.name == self.grid.view.sensor]
+        size_px = getattr(next(iter((*wanted, *sized)), None), "size_px", (4, 3))
+        return int(size_px[0]), int(size_px[1])
 
     def set_field(self, section: str, name: str, path: Sequence[str | int], value: Any) -> str:
         """The text with another value of a field of a named item, or of a section (no name).

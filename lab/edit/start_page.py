@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import secrets
 from contextlib import suppress
 from functools import partial
@@ -34,8 +35,12 @@ def shipped_configurations() -> dict[str, str]:
 
 def headline(text: str) -> str:
     """First sentence of the comment at the head of a configuration."""
-    lines = (line.removeprefix("#").strip() for line in text.splitlines() if line.startswith("#"))
-    return next((line for line in lines if line and not line.startswith("yaml-language")), "")
+    head = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    lines = [line.removeprefix("#").strip() for line in head]
+    own = itertools.dropwhile(lambda line: not line or line.startswith("yaml-language"), lines)
+    paragraph = " ".join(itertools.takewhile(bool, own))
+    first, stop, _ = paragraph.partition(". ")
+    return first + stop.strip()
 
 
 def picture_name(name: str, text: str) -> str:

@@ -25,6 +25,8 @@ from gen_data.core import activity, errors, processes
 from gen_data.core.system_calls import KILLED
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gen_data.lab.edit.samples import Studio
 
 GRACE_S = 1.5
@@ -41,7 +43,8 @@ NICENESS = 0
 """Of the processes, for the page and the browser to go first."""
 
 _START = (
-    "import os, sys; sys.path[:] = sys.argv[1:]; "
+    "import os, sys; scratch, *sys.path[:] = sys.argv[1:]; "
+    "os.environ.update({'TMPDIR': scratch} if scratch else {}); "
     f"os.environ.update(dict.fromkeys({processes.SINGLE_THREADED!r}, '1')); "
     "from gen_data.lab.edit.workers import work; work()"
 )
@@ -145,6 +148,7 @@ class Workers:
         count: Number of processes.
         deliver: Receives each ticket that is current, and its result; called in threads.
         hear: Receives each ticket that is current, and what its process prepares for it.
+        scratch: Folder for temporary files, which processes that are ended leave; None = the usual.
     """
 
     def __init__(
@@ -152,7 +156,9 @@ class Workers:
         count: int,
         deliver: Callable[[Ticket, Any], None],
         hear: Callable[[Ticket, Activity], None] = lambda *_: None,
+        scratch: Path | None = None,
     ) -> None:
+        self._scratch = str(scratch or "")
         self._deliver, self._hear = deliver, hear
         self._queue = Queue()
         self._changed = threading.Condition()
@@ -249,10 +255,14 @@ class Workers:
         return ended
 
     def _start(self, number: int) -> subprocess.Popen[bytes]:
-        command = processes.tie([sys.executable, "-c", _START, *sys.path])
+        command = processes.tie([sys.executable, "-c", _START, self._scratch, *sys.path])
         with self._changed:
             with processes.interrupts_blocked():
-                child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+                child = subprocess.Popen(
+                    command,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                )
             self._children[number] = child
             if self._closed:
                 child.kill()

@@ -1,5 +1,6 @@
 """``gen-data match``: a configuration fitted to recordings."""
 
+from functools import partial
 from pathlib import Path
 
 import click
@@ -57,7 +58,8 @@ def match(
     from gen_data.lab.matching.api import match as fit
     from gen_data.lab.matching.match_report import make_tables
 
-    with Console(stderr=True).status("") as status:
+    console = Console(stderr=True)
+    with console.status("") as status:
         found = fit(
             folder,
             config,
@@ -67,7 +69,8 @@ def match(
             scenes=scenes,
             camera=camera,
             lidar=lidar,
-            on_progress=status.update,
+            # A file or another program gets lines.
+            on_progress=status.update if console.is_terminal else partial(click.echo, err=True),
         )
     print_tables(Console(), map(asdict, make_tables(found)))
     for path in (out, out.with_suffix(".json"), out.with_suffix(".html")):

@@ -64,7 +64,7 @@ def test_a_street_has_its_horizon(
     edges = find_edges(street_lines(pose, lens, yaw_deg))
     known = estimate_camera(edges, lens.fx_px)
     assert angle_deg(pose, known.zenith) < 0.1
-    assert known.error_rad < math.radians(0.3)
+    assert known.error_rad < math.radians(0.6)
     unknown = estimate_camera(edges, None)
     assert angle_deg(pose, unknown.zenith) < 0.3
     assert unknown.focal_px == pytest.approx(lens.fx_px, rel=0.02)
@@ -78,7 +78,7 @@ def test_edges_without_common_directions_are_refused() -> None:
         x, y = (int(v) for v in rng.integers(0, 640, 2))
         dx, dy = (int(v) for v in rng.normal(0.0, 80.0, 2))
         cv2.line(image, (x, y), (x + dx, y + dy), (30, 30, 30), 2, cv2.LINE_AA)
-    with pytest.raises(NoHorizonError, match="agree on directions"):
+    with pytest.raises(NoHorizonError, match=r"agree on directions|no two directions"):
         estimate_camera(find_edges(image), 700.0)
     with pytest.raises(NoHorizonError, match="0 straight edges"):
         estimate_camera(find_edges(np.full((64, 64, 3), 90, np.uint8)), 70.0)
@@ -124,7 +124,7 @@ def test_the_estimate_is_reported_with_its_error(tmp_path: Path) -> None:
     up = plate.T_world_camera.inverse().rotate(np.array([0.0, 0.0, 1.0]))
     assert angle_deg(pose, up) < 0.1
     (finding,) = check_folder(tmp_path, library)
-    assert "estimated to 0." in finding.note
+    assert "looks down 6.0 deg and rolls -1.5 deg (estimated within 1.0 deg)" in finding.note
     assert "hfov 65.0 deg" in finding.note
 
 

@@ -33,18 +33,20 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     for picture in (folder / "real").rglob("*.png"):  # A fit leaves out pictures without colours.
         pixels = cv2.imread(str(picture)) * (0.8, 1.0, 0.9)
         cv2.imwrite(str(picture), pixels.astype(np.uint8))
+    temporary = tmp_path_factory.mktemp("temporary")
     cache = make_cache(tmp_path_factory.mktemp("cache"))
     arguments = ("mine.yaml", "--real", "real")
     with (
         open_browser() as opened,
-        served(folder, *arguments, XDG_CACHE_HOME=str(cache)) as url,
+        served(folder, *arguments, XDG_CACHE_HOME=str(cache), TMPDIR=str(temporary)) as url,
     ):
         page = opened.page
         page.set_default_timeout(WAIT_MS)
         page.goto(url)
-        live = Live(folder, cache, url, opened)
+        live = Live(folder, cache, url, opened, temporary)
         live.show_four()
         yield live
+    assert list(temporary.iterdir()) == []  # A server that has ended leaves no copies of files.
 
 
 @pytest.fixture

@@ -49,12 +49,14 @@ class Live:
         folder: Current folder of the server.
         cache: Its ``XDG_CACHE_HOME``.
         url: With the token.
+        temporary: Its folder for temporary files.
     """
 
     folder: Path
     cache: Path
     url: str
     opened: Opened
+    temporary: Path
 
     @property
     def page(self) -> Page:

@@ -217,11 +217,20 @@ def test_a_text_is_saved_under_another_name(live: Live, page: Page) -> None:
         type_behind(other, "# My table", ", again")
         for name, told in (("mine.yaml", "is there"), ("../x.yaml", "outside of the folders")):
             other.click("button:has-text('Save as')")
+            other.wait_for_selector("input[aria-label=File]:focus")
             other.fill("input[aria-label=File]", name)
-            other.press("input[aria-label=File]", "Enter")
+            other.keyboard.press("Enter")
             other.wait_for_selector(f".q-notification:has-text('{told}')")
             other.keyboard.press("Escape")
             other.wait_for_selector(".q-dialog", state="detached")
+        other.click("button:has-text('Save as')")
+        card = other.locator(".q-dialog .q-card")
+        assert card.evaluate(
+            "e => e.scrollWidth <= e.clientWidth && e.scrollHeight <= e.clientHeight"
+            " && e.clientWidth <= 420"
+        )
+        card.locator("button:has-text('Cancel')").click()
+        other.wait_for_selector(".q-dialog", state="detached")
         other.click("button:has-text('Save as')")
         other.fill("input[aria-label=File]", "copy.yaml")
         other.click(".q-dialog button:has-text('Save')")
@@ -233,11 +242,17 @@ def test_a_text_is_saved_under_another_name(live: Live, page: Page) -> None:
     (live.folder / "copy.yaml").unlink()
 
 
-def test_a_sample_in_full_size_has_its_draws_and_a_recording(page: Page) -> None:
+def test_a_sample_in_full_size_has_its_draws_and_a_recording(live: Live, page: Page) -> None:
     """The recording is a file for the Rerun viewer."""
     page.click(".gd-tile >> nth=1")
     page.wait_for_selector(".q-dialog td:has-text('clutter.upright')")
     page.wait_for_selector(".q-dialog img[src]")
+    from gen_data.lab.edit.panels import object_rows  # It needs NiceGUI.
+
+    # Sizes are those of the picture in full size.
+    shown = Studio().show(Order(text_of(page), str(live.folder / "mine.yaml"), 1, View(), (), 0))
+    cells = page.locator(".q-dialog table").first.locator("td").all_inner_texts()
+    assert cells == [cell for row in object_rows(shown) for cell in row]
     with page.expect_download() as download:
         page.click("button:has-text('Recording for Rerun')")
     assert download.value.suggested_filename == "sample_000001.rrd"
@@ -252,10 +267,11 @@ def test_one_sample_has_a_low_a_middle_and_a_high_value(page: Page) -> None:
     page.click("button:has-text('Vary this one')")
     page.click("button[aria-label='Vary count']")
     for slot, count in enumerate((2, 3, 6)):
-        page.wait_for_selector(f"[data-slot='{slot}'] :text-is('count: {count}')")
+        page.wait_for_selector(f"[data-slot='{slot}'] :text-is('sample 1, count: {count}')")
     assert page.locator(".gd-tile").count() == 3
     page.click(".gd-tile >> nth=2")
     page.wait_for_selector(".q-dialog .gd-name:text-is('sample 1')")
+    page.wait_for_selector(".q-dialog img[src]")
     assert page.locator(".q-dialog table").first.locator("tr").count() == 1 + 6
     page.click(".q-dialog button:has-text('Close')")
     page.click("button:has-text('All samples')")
@@ -303,6 +319,16 @@ def test_keys_of_a_lost_connection_are_not_lost(live: Live, page: Page) -> None:
     assert live.read() == TEXT.replace("# My table.\r", "# My table again.").encode()
 
 
+def test_the_page_keeps_its_place_while_pictures_come(live: Live) -> None:
+    """Tiles have the shape of their pictures before these are rendered."""
+    with live.tab("?open=mine.yaml") as other:
+        other.wait_for_selector(".gd-tile")
+        place = "document.querySelector('.q-tabs').getBoundingClientRect().top"
+        before = other.evaluate(place)
+        other.wait_for_function(f"{COUNTS}.every(n => n)")
+        assert abs(other.evaluate(place) - before) <= 1.0
+
+
 def test_unsaved_text_outlives_a_reload(live: Live, page: Page) -> None:
     """With a notice; the file is as it was saved."""
     saved = live.read()
@@ -326,7 +352,7 @@ def test_the_second_of_two_tabs_to_save_is_asked(live: Live, page: Page) -> None
         page.wait_for_selector(".q-dialog:has-text('has changed since it was read')")
         assert b"# My table, other" in live.read()
         page.click("button:has-text('Overwrite')")
-        page.wait_for_selector("[role=status]:text-is('saved')")
+        page.wait_for_selector(".q-dialog", state="detached")
         assert live.read().decode().replace("\r\n", "\n") == LINES
 
 

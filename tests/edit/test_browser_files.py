@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -63,22 +62,25 @@ def photograph() -> bytes:
 def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
     """In an empty file: the photograph stands behind four classes; a dropped mesh is the fifth."""
     with live.tab("?open=mine_too.yaml") as page:
-        page.wait_for_selector(".gd-fault:has-text(\"type 'extends: '\")")
+        # Not a fault, but ways to begin.
+        page.wait_for_selector(".gd-begin:has-text('Begin with a shipped configuration')")
+        assert page.locator("button:has-text('extends: rooms.yaml')").count() == 1
+        assert page.locator(".gd-fault").count() == 0
         page.click("[data-grid=slots]")
         page.click(".q-item:has-text('4')")
         page.click(".q-tab:has-text('Own files')")
         file = {"name": "desk.jpg", "mimeType": "image/jpeg", "buffer": photograph()}
         page.set_input_files("input[type=file]", [file])
         card = page.locator("[data-file='desk.jpg']")
-        card.locator("[role=status]:has-text('no horizon was found')").wait_for()
+        card.locator("[role=status]:has-text('not sure how the camera looked')").wait_for()
         tilt = card.locator("[data-standpoint=tilt_deg]")
         assert tilt.input_value() == "30"
         card.locator("[data-standpoint=height_m]").fill("1")
         card.locator("[role=status]:has-text('room for things 1.2 m')").wait_for()
         # A minute of thought, in which another process clears up.
-        for folder in Path(tempfile.gettempdir()).glob("gen-data-edit-*"):
+        for folder in live.temporary.glob("gen-data-edit-*"):
             os.utime(folder, (0, 0))
-        remove_abandoned(Path(tempfile.gettempdir()))
+        remove_abandoned(live.temporary)
         picture = card.locator("img")
 
         def await_another(drawn: str | None) -> None:
@@ -99,6 +101,8 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
             tilt.fill(given)
             card.locator(f'[role=status]:has-text("{told}")').wait_for()
             await_another(drawn)
+        card.locator("[data-standpoint=roll_deg]").fill("4")
+        card.locator("[role=status]:has-text('looks down 40.0 deg and rolls 4.0 deg')").wait_for()
         drag(page, card, (0.1, 0.4), (0.25, 0.5))
         page.wait_for_selector(
             "[aria-label='ground from top to bottom [%]'][aria-valuenow='45|95']"
@@ -120,12 +124,17 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
         }  # fmt: skip
         kept = (live.folder / "assets/assets.yaml").read_text()
         assert "[32, 228], [80, 120], [288, 108], [288, 228]" in kept
+        assert "roll_deg: 4" in kept
         page.click(".gd-tile >> nth=0")
         page.wait_for_selector(".q-dialog td >> text=/^(things|own_my_wedge)/")
         page.click(".q-dialog button:has-text('Close')")
         page.get_by_role("button", name="Save", exact=True).click()
         page.wait_for_selector("[role=status]:text-is('saved')")
         fit(page)
+        with page.expect_popup() as popup:
+            page.click("a:has-text('report mine_too_matched.html')")
+        assert popup.value.locator("h1, title").first.inner_text() or popup.value.title()
+        popup.value.close()
         page.click("a:has-text('open mine_too_matched.yaml')")
         page.wait_for_selector(".gd-title:text-is('mine_too_matched.yaml')")
         page.wait_for_function(f"{COUNTS}.some(n => n)")
@@ -137,6 +146,10 @@ def fit(page: Page) -> None:
     """With few scenes, until it tells which file it has written."""
     page.click(".q-tab:has-text('Statistics')")
     page.fill("[data-fit=scenes]", "4")
+    page.click("button:has-text('Fit to the real pictures')")
+    page.wait_for_selector("[role=status]:has-text('fitting: ')")
+    page.click("button:has-text('Cancel'):visible")
+    page.wait_for_selector("[role=status]:has-text('the fit was cancelled')")
     page.click("button:has-text('Fit to the real pictures')")
     page.wait_for_selector("[role=status]:has-text('wrote mine_too_matched.yaml')")
 

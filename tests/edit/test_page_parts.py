@@ -20,6 +20,7 @@ from gen_data.core.lens import Lens
 from gen_data.lab.edit import data_sets, own_files, server
 from gen_data.lab.edit.desk import Pictures
 from gen_data.lab.edit.files import Folders, OpenedFile
+from gen_data.lab.edit.reuse import Memory
 from gen_data.lab.edit.samples import Check, Labelled, Shown, Studio, shrink
 from gen_data.lab.edit.server import COOKIE, Guard, free_port, usual_port
 from gen_data.lab.edit.session import Session, vary
@@ -36,6 +37,20 @@ SHOWN = Shown(
     5,
     1,
 )
+
+
+def test_results_are_known_by_the_same_object_and_settings() -> None:
+    """Not by an equal one; the oldest go first, and errors are not kept."""
+    memory, made = Memory(limit=2), iter(range(9))
+    one, equal = [1], [1]
+    assert [memory.get(one, "a", lambda: next(made)) for _ in range(2)] == [0, 0]
+    assert memory.get(equal, "a", lambda: next(made)) == 1
+    assert memory.get(one, "a", lambda: next(made)) == 0
+    assert memory.get(one, "b", lambda: next(made)) == 2
+    assert memory.get(equal, "a", lambda: next(made)) == 3
+    with pytest.raises(ZeroDivisionError):
+        memory.get(one, "c", lambda: 1 / 0)
+    assert memory.get(one, "c", lambda: next(made)) == 4
 
 
 def tickets(client: str, count: int) -> list[Ticket]:

@@ -37,6 +37,12 @@ def test_an_entry_has_the_horizon_of_the_tilt() -> None:
         "ground": [[200, 600], [200, 300], [600, 300], [600, 600]],
     }
     assert "horizon" not in Standpoint(hfov_deg=90.0).entry("a.jpg", b"", (800, 600))
+    entry = Standpoint(0.6, 45.0, 90.0, roll_deg=60.0).entry("a.jpg", b"", (800, 600))
+    assert entry["horizon"] == {"height_px": -500.0, "roll_deg": 60.0}
+    # Without a tilt and EXIF data, both it and the field of view are found, or neither.
+    data = cv2.imencode(".png", np.zeros((6, 8), np.uint8))[1].tobytes()
+    assert "hfov_deg" not in UNKNOWN.entry("a.jpg", data, (800, 600))
+    assert UNKNOWN.tilted().entry("a.jpg", data, (800, 600))["hfov_deg"] == 65.0
     assert UNKNOWN.tilted().tilt_deg == 30.0
 
 

@@ -20,6 +20,32 @@ TEXT = "\n".join(f"{key}: {value}" for key, value in CONFIG.items()).replace("Fa
 
 
 @pytest.mark.slow
+def test_a_changed_text_has_the_pictures_of_a_new_process() -> None:
+    """Whatever was kept of earlier texts: after changes of objects, lights, camera and labels."""
+    lines = (
+        "- {name: clutter, count: 3}",
+        "- {name: lamps, illuminance_lux: 500}",
+        "- {name: orbit, distance_m: 1.2}",
+    )
+    text = "\n".join([TEXT, "randomizers:", *lines, "labels: {min_visible_px: 16}", "seed: 3\n"])
+    studio = Studio()
+    drawn = [studio.show(Order(text, "x.yaml", 1, View())).jpeg]
+    for old, new in (
+        ("illuminance_lux: 500", "illuminance_lux: 900"),
+        ("distance_m: 1.2", "distance_m: 1.0"),
+        ("count: 3", "count: 5"),
+        ("min_visible_px: 16", "min_visible_px: 4000"),
+        ("seed: 3", "seed: 4"),
+    ):
+        text = text.replace(old, new)
+        drawn.append(studio.show(Order(text, "x.yaml", 1, View())).jpeg)
+        anew = Studio().show(Order(text, "x.yaml", 1, View()))
+        assert drawn[-1] == anew.jpeg
+        assert studio.show(Order(text, "x.yaml", 1, View())).draws == anew.draws
+    assert len(set(drawn)) == len(drawn)
+
+
+@pytest.mark.slow
 def test_a_small_picture_shows_the_sample_of_the_run() -> None:
     """The same objects in the same places, but for a pixel of the small image on each side."""
     studio = Studio()
