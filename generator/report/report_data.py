@@ -133,11 +133,12 @@ def _label_tables(stored: StoredSamples) -> Iterator[report_tables.Table]:
 
 
 def without_pictures(report: Json) -> Json:
-    """The report without ``data:`` URLs and points, for ``report.json``."""
+    """The report without ``data:`` URLs, points and lines, for ``report.json``."""
 
     def strip(value: Any) -> Any:
         if isinstance(value, dict):
-            left = {k: strip(v) for k, v in value.items() if k not in ("pictures", "points")}
+            dropped = ("pictures", *sample_browser.DRAWN)
+            left = {k: strip(v) for k, v in value.items() if k not in dropped}
             return left | ({"picture": ""} if "picture" in left else {})
         return [strip(item) for item in value] if isinstance(value, list) else value
 

@@ -16,12 +16,12 @@ from gen_data.core.capture import POINT, Capture, Channel, PointCloud, SensorRea
 from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo, cloud_path, media_path
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import (
+    BorderTruth,
     EgoTruth,
     ImageTruth,
     KeypointTruth,
     MaskPx,
     ObjectTruth,
-    Occupancy,
     Sample,
 )
 from gen_data.core.scene import Camera, Instance, Lidar, Scene
@@ -79,10 +79,11 @@ def write_dataset(
     samples: Sequence[Sequence[ObjectTruth]],
     categories: tuple[str, ...],
     images: Sequence[NDArray[np.uint8]],
-    grids: Sequence[Occupancy] = (),
+    frames: Sequence[EgoTruth] = (),
+    borders: tuple[BorderTruth, ...] | None = None,
     **changes: Any,
 ) -> Path:
-    """A finished data set with a camera and a laser scanner, in one shard; images, grids in turn.
+    """A finished data set with a camera and a laser scanner, in one shard; images, frames in turn.
 
     Scene ``k`` is sample ``k``; every fourth sample is in the split ``val``. Depth is 2 m
     everywhere; the scanner has three points, of which one is behind the camera.
@@ -119,8 +120,9 @@ def write_dataset(
         (shard / "scenes.jsonl").open("w", encoding="utf-8") as scenes,
     ):
         for index, objects in enumerate(samples):
-            frame = EgoTruth(occupancy=grids[index % len(grids)]) if grids else None
-            sample = replace(_sample(index, objects, camera), frame=frame)
+            frame = frames[index % len(frames)] if frames else None
+            truth = {"color": ImageTruth(camera, tuple(objects), borders=borders)}
+            sample = replace(_sample(index, objects, camera), frame=frame, truth=truth)
             labels.write(labels_line(sample) + "\n")
             scenes.write(scene_line(sample, None) + "\n")
             media_path(shard, "color", Channel.RGB, index).write_bytes(pngs[index % len(pngs)])
@@ -141,5 +143,5 @@ def _sample(index: int, objects: Sequence[ObjectTruth], camera: Camera) -> Sampl
             {"color": SensorReading("color", camera, {})},
             {"top": PointCloud("top", Lidar("top", "color"), POINTS)},
         ),
-        truth={"color": ImageTruth(camera, tuple(objects))},
+        truth={},
     )

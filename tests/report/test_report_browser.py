@@ -12,7 +12,7 @@ from gen_data.report.html_page import format_page
 from gen_data.report.report_data import describe_dataset
 from tests.browser import Opened, open_browser
 from tests.report.handmade import HOSTILE, HOSTILE_NAME, make_image, make_object, write_dataset
-from tests.report.test_report_occupancy import make_grid
+from tests.report.test_report_layers import BORDERS, make_frame
 
 pytestmark = pytest.mark.slow
 
@@ -22,9 +22,9 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
     folder = tmp_path_factory.mktemp("sets")
     rng = np.random.default_rng(5)
     samples = [[make_object(1, "car"), make_object(2, "bus", 40, 16)]] * 14 + [[]]
-    grids = [make_grid()] * 14 + [make_grid(0)]
+    frames = [make_frame()] * 14 + [make_frame(0)]
     sets = [
-        write_dataset(folder / name, samples, ("bus", "car"), [make_image(rng)], grids)
+        write_dataset(folder / name, samples, ("bus", "car"), [make_image(rng)], frames, BORDERS)
         for name in ("one", "two")
     ]
     path = folder / "index.html"
@@ -50,7 +50,7 @@ def test_layers_and_filters_change_the_shown_image(opened: Opened) -> None:
     """By buttons and by keys; no message and no request but for the page itself."""
     page = opened.page
     assert shown(opened).startswith("1 of 15: sample 0, color")
-    for layer in ("boxes", "boxes3d", "masks", "keypoints", "points", "depth"):
+    for layer in ("boxes", "boxes3d", "masks", "keypoints", "points", "depth", "lanes", "tracks"):
         before = pixels(opened)
         page.click(f"button[data-layer={layer}]")
         page.wait_for_function(

@@ -1,7 +1,11 @@
-"""Occupancy in reports: voxels by state and class counted on paper, and their view from above."""
+"""Occupancy, lanes, tracks and layers in reports.
+
+Voxels by state and class are counted on paper, as is their view from above.
+"""
 
 import base64
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -9,13 +13,25 @@ import numpy as np
 import pytest
 
 from gen_data.core.asset_types import SURFACES
-from gen_data.core.sample import Occupancy
+from gen_data.core.capture import Capture, Channel, SensorReading
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.core.sample import (
+    BorderTruth,
+    EgoTruth,
+    ImageTruth,
+    Occupancy,
+    PointTracks,
+    Sample,
+    SensorTracks,
+)
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import IDENTITY
-from gen_data.exporters.label_colors import SURFACE_COLORS, UNLABELLED, id_color
+from gen_data.exporters.label_colors import SURFACE_COLORS, UNLABELLED, color_ids, id_color
+from gen_data.exporters.label_parts import BORDER_COLORS
 from gen_data.preview.voxel_view import UNSEEN, view_from_above
 from gen_data.report.report_data import describe_dataset, without_pictures
-from tests.report.handmade import make_image, make_object, write_dataset
+from gen_data.report.sample_browser import browser_images
+from tests.report.handmade import CAMERA, make_image, make_object, write_dataset
 
 FREE, SURFACE, INTERIOR = range(3)
 ASPHALT = SURFACES.index("asphalt")
@@ -38,6 +54,21 @@ def make_grid(number: int = CAR) -> Occupancy:
     scanner[0, 0, 2] = True
     seen = {"color": camera, "top": scanner}
     return Occupancy(IDENTITY, (0.0, 0.0, 0.0), 0.5, state, instance, surface, seen)
+
+
+BORDERS = (
+    BorderTruth("a:left", "edge", ((5.2, 40.0), (20.0, 30.4), (30.0, 20.0)), (True, True, False)),
+)
+
+
+def make_frame(number: int = CAR) -> EgoTruth:
+    """The grid, and three tracked points: seen, hidden, and outside the image."""
+    places = np.array([[20.4, 20.6], [40.0, 45.0], [-9.0, 5.0]], np.float32)
+    states = np.array([0, 2, 3], np.uint8)
+    seen = SensorTracks(np.ones((3, 3), np.float32), places, states, np.zeros(3, np.uint16))
+    position = np.zeros((3, 3), np.float32)
+    tracks = PointTracks(np.zeros(3, np.uint16), position, {"color": seen})
+    return EgoTruth(occupancy=make_grid(number), tracks=tracks)
 
 
 def shaded(color: Any, share: float) -> list[int]:
@@ -86,7 +117,7 @@ def described(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("grids") / "set"
     samples = [[make_object(CAR, "car")]] * 2
     return describe_dataset(
-        write_dataset(folder, samples, ("car",), [image], [make_grid()]), scenes_max=0
+        write_dataset(folder, samples, ("car",), [image], [make_frame()], BORDERS), scenes_max=0
     )
 
 
@@ -124,8 +155,51 @@ def test_each_image_of_the_page_has_the_view_and_numbers_of_its_sample(
     assert "base64" not in str(without_pictures(described))
 
 
+def test_lanes_and_tracked_points_of_an_image_are_data_of_the_page(
+    described: dict[str, Any],
+) -> None:
+    """In whole pixels, hidden parts and points apart; the figures of ``report.json`` have none."""
+    for shown in described["browser"]:
+        color = "#{:02x}{:02x}{:02x}".format(*BORDER_COLORS["edge"])
+        assert shown["lanes"] == [
+            [color, True, [5, 40, 20, 30]], [color, False, [20, 30, 30, 20]],
+        ]  # fmt: skip
+        one, two = ("#{:02x}{:02x}{:02x}".format(*id_color(k)) for k in (1, 2))
+        assert shown["tracks"] == [[one, True, 20, 21], [two, False, 40, 45]]
+    assert "lanes" not in without_pictures(described)["browser"][0]
+
+
+def test_layers_and_mirrors_are_pictures_below_one_another() -> None:
+    """Two layers of ids, of a mirror one: a third of the height each, in the colours of the ids."""
+    ids = np.repeat(np.arange(8, dtype=np.uint16), 8 * 48).reshape(64, 48).T
+    channels = {
+        Channel.RGB: np.zeros((48, 64, 3), np.uint8),
+        Channel.INSTANCE_LAYERS: np.stack([ids, np.zeros_like(ids)], axis=-1),
+        Channel.SEEN_IN_MIRROR: ids[:, ::-1],
+    }
+    reading = SensorReading("color", CAMERA, channels)
+    sample = Sample(
+        0, 0, 0, "train", Scene("hand"), Capture({"color": reading}),
+        {"color": ImageTruth(CAMERA, ())},
+    )  # fmt: skip
+    info = DatasetInfo(
+        "hand", 0, 1, 1, (), (SensorInfo("color", Modality.CAMERA, channels=tuple(channels)),)
+    )
+    stored = SimpleNamespace(info=info, n=1, indices=[0], labelled=lambda index: sample)
+    (image,) = browser_images(stored, 10**6)  # type: ignore[arg-type]
+
+    assert image.facts["layers"] == ["instance_layers", "seen_in_mirror"]
+    encoded = base64.b64decode(image.pictures["layers"].partition(",")[2])
+    shown = cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
+    expected = color_ids(np.concatenate([ids, np.zeros_like(ids), ids[:, ::-1]]))
+    assert shown.shape == expected.shape
+    # JPEG changes colours next to edges.
+    inner = (np.arange(3)[:, None] * 48 + np.arange(16, 32)).ravel()
+    assert np.abs(shown[inner, 4::8].astype(int) - expected[inner, 4::8]).max() < 24
+
+
 def test_a_data_set_without_grids_has_no_tables_of_them(tmp_path: Path) -> None:
     image = make_image(np.random.default_rng(6))
     plain = describe_dataset(write_dataset(tmp_path / "set", [[]], ("car",), [image]), scenes_max=0)
     assert not any("ccupancy" in table["title"] for table in plain["tables"])
-    assert "occupancy" not in plain["browser"][0]
+    assert not {"occupancy", "lanes", "tracks", "layers"} & plain["browser"][0].keys()
