@@ -19,6 +19,7 @@ import struct
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -48,7 +49,9 @@ _MAPPED_BYTES_MIN = 64 * 1024
 _CHUNK_BYTES = 256 * 1024
 _INTACT_FILES = 16_384
 _CHECKED = "user.gen_data.checked"
-"""Attribute of a large file: the version of it whose checksum was found right."""
+"""Attribute of a large file: its version whose checksum was found right, and when."""
+_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+"""Of Linux: differs after each start of the machine."""
 
 
 def content_key(description: Mapping[str, Any]) -> str:
@@ -204,8 +207,9 @@ def _load(path: str, key: str, intact: CountCache[None]) -> Arrays | None:
     """Load the arrays of a file; None if it is missing, damaged, or has another key.
 
     Large files with a right checksum are noted in ``intact``, and on themselves for other
-    processes: later loads, of which there are hundreds per scene, need not read them as a whole
-    again unless they have changed.
+    processes until the machine starts again, since a loss of power may damage files: later loads,
+    of which there are hundreds per scene, need not read them as a whole again unless they have
+    changed.
     """
     try:
         with open(path, "rb") as file:  # noqa: PTH123
@@ -227,7 +231,7 @@ def _load(path: str, key: str, intact: CountCache[None]) -> Arrays | None:
 def _is_noted(file: BinaryIO, version: str) -> bool:
     """Whether the file states that this version of it was checked; False where it cannot."""
     try:
-        return os.getxattr(file.fileno(), _CHECKED) == version.encode()
+        return os.getxattr(file.fileno(), _CHECKED) == f"{version} {_boot()}".encode()
     except (OSError, AttributeError):
         # Not noted, or no attributes: on this file system, or at all, as on macOS.
         return False
@@ -235,7 +239,12 @@ def _is_noted(file: BinaryIO, version: str) -> bool:
 
 def _note(file: BinaryIO, version: str) -> None:
     with contextlib.suppress(OSError, AttributeError):
-        os.setxattr(file.fileno(), _CHECKED, version.encode())
+        os.setxattr(file.fileno(), _CHECKED, f"{version} {_boot()}".encode())
+
+
+@cache
+def _boot() -> str:
+    return _BOOT_ID.read_text("ascii").strip()
 
 
 def _is_intact(file: BinaryIO) -> bool:
