@@ -321,7 +321,7 @@ def _lay_out(line: Writing, numbers: Sequence[int], locate: _Locate) -> SurfaceT
 def _around(quads: Array) -> Array:
     """The smallest parallelogram around quads [n, 4, k] of the same directions, [4, k]."""
     if len(quads) == 1:
-        return quads[0]
+        return np.asarray(quads[0])
     right, down = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
     area = np.linalg.norm(right, axis=1) * np.linalg.norm(down, axis=1)
     largest = int(area.argmax())
