@@ -36,7 +36,7 @@ NEAR_M, NEAR_SHARE = 0.003, 0.001
 """What is nearer than the text by more hides it: this, and this share of the distance."""
 MARGIN_PX = 64.0
 """Lines this far outside the image are looked at more closely."""
-_PLACES = 4096
+_PLACES = 1024
 """Assets whose lines are kept in memory."""
 
 
@@ -173,7 +173,10 @@ def _lines_in_view(
     camera, found, corners = reading.camera, [], []
     lens = camera.intrinsics
     T_camera_world = camera.T_world_camera.inverse()
+    shown = set(np.unique(reading.channels[Channel.INSTANCE]).tolist())
     for number, body in enumerate(scene.bodies):
+        if body.instance_id not in shown:
+            continue
         materials = body.materials or assets.materials(body.asset)
         textures = tuple("" if m.texture_scale_m else m.texture for m in materials)
         written = _written_on(assets, body.asset, textures)

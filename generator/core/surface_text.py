@@ -42,6 +42,10 @@ class SurfaceQuads:
     weights: Array
     corners_m: Array
 
+    def take(self, rows: slice) -> "SurfaceQuads":
+        """Some of the quads."""
+        return SurfaceQuads(self.face[rows], self.weights[rows], self.corners_m[rows])
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SurfaceWord:
@@ -289,29 +293,35 @@ def _on_chart(chart: _Chart, uv: Array, triangles: Mapping[int, int]) -> _Locate
 def _lay_out(line: Writing, numbers: Sequence[int], locate: _Locate) -> SurfaceText:
     """A line with some of its characters, by their numbers, on a surface."""
     letters = [k for k, letter in enumerate(line.text) if not letter.isspace()]
-    if line.kind != "print":
-        quads, mirrored = locate([numbers, numbers])
-        word = SurfaceWord(line.text, quads, mirrored)
-        quad = locate([numbers])[0]
-        return SurfaceText(line.text, line.language, line.stroke, line.kind, True, quad, (word,))
     groups: list[list[int]] = []
     for k in numbers:
-        between = line.text[letters[groups[-1][-1]] : letters[k]] if groups else " "
-        if any(c.isspace() for c in between):
+        if line.kind == "print":
+            between = line.text[letters[groups[-1][-1]] : letters[k]] if groups else " "
+            if any(c.isspace() for c in between):
+                groups.append([])
+        elif not groups:
             groups.append([])
         groups[-1].append(k)
-    words = []
+    rows = [numbers, *(part for group in groups for part in (group, *([k] for k in group)))]
+    quads, mirrored = locate(rows)
+    words, start = [], 1
     for group in groups:
-        quads, mirrored = locate([group, *([k] for k in group)])
-        words.append(SurfaceWord("".join(line.text[letters[k]] for k in group), quads, mirrored))
-    whole = len(numbers) == len(letters)
+        end = start + 1 + len(group)
+        text = line.text
+        if line.kind == "print":
+            text = "".join(line.text[letters[k]] for k in group)
+        words.append(SurfaceWord(text, quads.take(slice(start, end)), mirrored[start:end]))
+        start = end
+    whole = line.kind != "print" or len(numbers) == len(letters)
     text = line.text if whole else " ".join(word.text for word in words)
-    quad = locate([numbers])[0]
+    quad = quads.take(slice(0, 1))
     return SurfaceText(text, line.language, line.stroke, line.kind, whole, quad, tuple(words))
 
 
 def _around(quads: Array) -> Array:
     """The smallest parallelogram around quads [n, 4, k] of the same directions, [4, k]."""
+    if len(quads) == 1:
+        return np.asarray(quads[0])
     right, down = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
     area = np.linalg.norm(right, axis=1) * np.linalg.norm(down, axis=1)
     largest = int(area.argmax())

@@ -20,10 +20,12 @@ from gen_data.core.asset_types import Material, MeshData
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
+from gen_data.core.motion import Trajectory
 from gen_data.core.sample import ImageTruth, TextTruth, WordTruth
 from gen_data.core.scene import Body, Camera, Scene
 from gen_data.core.se3 import SE3, look_at
 from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.core.shutter import Shutter
 from gen_data.core.writing import Writing, recording
 from tests.assets.test_draped_meshes import HILL, PLACE
 from tests.embree import RayCaster, placed
@@ -384,6 +386,29 @@ def is_there(line: Writing, letter: str, uv: Any) -> bool:
         if own == letter and (np.abs(quad.mean(axis=0) - (x, y)) < 0.25 * size + 2e-3).all():
             return True
     return False
+
+
+@pytest.mark.parametrize("readout_s", [0.0, 0.03, -0.03])
+def test_text_that_moves_is_where_the_rows_of_a_rolling_shutter_show_it(readout_s: float) -> None:
+    """A sheet 2 m away that moves to the right by 350 px/s: each corner by its row's delay."""
+    lens = Intrinsics(640, 480, 700.0, 700.0, 320.0, 240.0)
+    view = Camera("color", look_at((2.0, 0.0, 0.0), (0.0, 0.0, 0.0)), lens,
+                  shutter=Shutter(0.0, readout_s))  # fmt: skip
+    way = tuple(SE3((0.0, y, 0.0)) for y in (-1.0, 0.0, 1.0))
+    scene = Scene("s", bodies=(Body("print", "flat", instance_id=1),), cameras=(view,),
+                  tracks=(Trajectory("print", 1.0, way, -1.0),))  # fmt: skip
+    shape = (480, 640)
+    channels = {Channel.INSTANCE: np.ones(shape, np.uint16),
+                Channel.RANGE: (2.0 / lens.pixel_rays()[..., 2]).astype(np.float32)}  # fmt: skip
+    reading = SensorReading("color", view, channels)
+    texts = Text().annotate_image(scene, ASSETS, reading, ImageTruth(view, ())).texts or ()
+    assert [t.visible_fraction for t in texts] == [1.0, 1.0]
+    for text, line in zip(texts, printed()[1], strict=True):
+        letters = [c for word in text.words for c in word.characters]
+        for character, shares in zip(letters, line.quads, strict=True):
+            v = 240.0 + 350.0 * 0.2 * (shares[:, 1] - 0.5)
+            u = 320.0 + 350.0 * (0.4 * (shares[:, 0] - 0.5) + readout_s * (v / 480.0 - 0.5))
+            np.testing.assert_allclose(character.quad_px, np.stack([u, v], axis=1), atol=0.01)
 
 
 def test_a_plate_has_its_text_once_though_its_edges_show_the_texture_too() -> None:
