@@ -12,7 +12,10 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from benchmarks.runs import machine
 
@@ -22,35 +25,37 @@ _HERE = Path(__file__).resolve().parent.parent
 
 def measure(name: str, views: int, n: int, warm_up: int) -> float:
     """CPU ms per sample of ``n`` samples after ``warm_up`` others, with images and labels."""
-    from benchmarks.runs import cpu_s
-    from gen_data.assemble.config import load_config
-    from gen_data.assemble.pipeline_factory import PipelineFactory
-    from gen_data.runner.shard import write_images, write_records
-
+    factory_module = _module("assemble.pipeline_factory")
+    shards = _module("runner.shard")
     overrides = (f"views_per_scene={views}", "steps_per_scene=1")
-    factory = PipelineFactory(load_config(f"{name}.yaml", overrides=overrides), n + warm_up)
+    config = _module("assemble.config").load_config(f"{name}.yaml", overrides=overrides)
+    factory = factory_module.PipelineFactory(config, n + warm_up)
     with tempfile.TemporaryDirectory() as folder, factory() as pipeline:
         for index in range(n + warm_up):
             if index == warm_up:
-                started_s = cpu_s()
+                started_s = time.process_time()
             shard = Path(folder) / str(index)
             shard.mkdir()
             sample = pipeline.sample(index)
-            write_images(pipeline.info, sample, shard)
-            write_records(sample, None, shard)
+            shards.write_images(pipeline.info, sample, shard)
+            shards.write_records(sample, None, shard)
             for exporter in pipeline.exporters.values():
                 exporter.write_shard(pipeline.info, [sample], shard)
-        return 1e3 * (cpu_s() - started_s) / n
+        return 1e3 * (time.process_time() - started_s) / n
+
+
+def _module(name: str) -> Any:
+    """A module of the core, which was in ``gen_data.generator`` before."""
+    import gen_data
+
+    return import_module(f"{gen_data.Scene.__module__.removesuffix('core.scene')}{name}")
 
 
 def _measure_in(checkout: Path, *arguments: str) -> float:
     """Run this file with the packages of a checkout."""
     command = [sys.executable, str(Path(__file__).resolve()), "--one", *arguments]
-    # This checkout's benchmarks with the other one's packages.
-    path = os.pathsep.join((str(checkout), str(_HERE)))
-    done = subprocess.run(
-        command, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, check=True
-    )
+    environment = {**os.environ, "PYTHONPATH": str(checkout)}
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True)
     return float(done.stdout.split()[-1])
 
 

@@ -43,6 +43,7 @@ TABLE = PluginTable[Exporter](
         "pointclouds": "gen_data.exporters.pointclouds:PointClouds",
         "rerun": "gen_data.exporters.rerun:Rerun",
         "scannet": "gen_data.exporters.scannet:ScanNet",
+        "scene_text": "gen_data.exporters.scene_text:SceneText",
         "semantickitti": "gen_data.exporters.semantickitti:SemanticKitti",
         "solo": "gen_data.exporters.solo:Solo",
         "tables": "gen_data.exporters.measurement_tables:Tables",

@@ -38,7 +38,7 @@ from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import SE3
-from gen_data.exporters import base, image_files
+from gen_data.exporters import base, image_files, nuscenes_classes
 from gen_data.exporters.argoverse_map import argoverse_map
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.nuscenes_frames import annotated_things, rig_pose_at
@@ -51,6 +51,7 @@ from gen_data.exporters.sensor_selection import (
     instant_s,
     laser_scanner,
     rgb_cameras,
+    stamp_s,
 )
 from gen_data.exporters.sequences import (
     Frame,
@@ -117,8 +118,8 @@ class Argoverse2(base.AssetExporter):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: there is no laser scanner, a camera is not a pinhole, or a package is
-                missing.
+            ConfigError: there is no laser scanner, a camera is not a pinhole, no category has a
+                class in this format, or a package is missing.
         """
         base.check_installed(self.type, "pyarrow", "shapely")
         if not laser_scanner(info, self.lidar, self.type):
@@ -127,6 +128,9 @@ class Argoverse2(base.AssetExporter):
                 "{type: lidar, name: up_lidar, model: VLP-32C}"
             )
         check_pinholes(info, rgb_cameras(info), self.type)
+        things = nuscenes_classes.classes().things.items()
+        known = [ours for ours, theirs in things if theirs in CLASSES and "/" not in ours]
+        base.check_classes(self.type, info, known)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write scans and maps, and a line per sample.
@@ -152,8 +156,7 @@ class Argoverse2(base.AssetExporter):
                     folder / f"{sample.index:09d}.feather", scan_bytes(points, T_ego_lidar, sweep_s)
                 )
                 row["scan"] = True
-                ego = row["egos"][lidar]
-                row["boxes"] = list(_boxes(sample, lidar, _pose_of(ego["pose"]), points))
+                row["boxes"] = list(_boxes(sample, lidar, points))
             rows.append(row)
         write_frames(folder, rows)
 
@@ -272,7 +275,7 @@ def _row(info: DatasetInfo, sample: Sample, lidar: str) -> Row:
     ego = lidar_mount(scene, lidar).rig
     mounts = {lidar: relative_pose(scene, Mount(ego, SE3()), lidar_mount(scene, lidar))}
     lenses = {}
-    read = {lidar: instant_s(sample, lidar)}
+    read = {lidar: stamp_s(sample, lidar)}
     for name in rgb_cameras(info):
         if name in sample.truth:
             mounts[name] = relative_pose(scene, Mount(ego, SE3()), camera_mount(scene, name))
@@ -280,7 +283,7 @@ def _row(info: DatasetInfo, sample: Sample, lidar: str) -> Row:
             values = (lens.fx_px, lens.fy_px, lens.cx_px - 0.5, lens.cy_px - 0.5, 0.0, 0.0, 0.0,
                       lens.height_px, lens.width_px)  # fmt: skip
             lenses[name] = dict(zip(INTRINSICS, values, strict=True))
-            read[name] = instant_s(sample, name)
+            read[name] = stamp_s(sample, name)
     return frame_facts(info, sample) | {
         "scene": sample.scene_index,
         "mounts": {name: _pose_row(pose) for name, pose in mounts.items()},
@@ -294,21 +297,23 @@ def _row(info: DatasetInfo, sample: Sample, lidar: str) -> Row:
     }
 
 
-def _boxes(sample: Sample, lidar: str, T_world_ego: SE3, points: NDArray[np.void]) -> Iterable[Row]:
-    """Boxes in the ego's frame at the instant of a sweep."""
+def _boxes(sample: Sample, lidar: str, points: NDArray[np.void]) -> Iterable[Row]:
+    """Boxes in the ego's frame at the true instant of a sweep: they fit its points."""
+    time_s, ego = instant_s(sample, lidar), lidar_mount(sample.scene, lidar).rig
+    T_ego_world = rig_pose_at(sample.scene, ego, time_s).rounded(9).inverse()
     counts = np.bincount(points["instance_id"].astype(np.int64), minlength=1)
     own = _ego_instance(sample, lidar)
     for number, thing in annotated_things(sample).items():
         category = CLASSES.get(thing.category)
         if category is None or number == own:
             continue
-        box = thing.box(instant_s(sample, lidar), 0.0)
+        box = thing.box(time_s, 0.0)
         sizes = dict(zip(SIZES, (round(v, 6) for v in box.size_m), strict=True))
         yield {
             "track_uuid": f"{sample.scene_index:06d}-{sample.view_index:03d}-{number:05d}",
             "category": category,
             **sizes,
-            **_pose_row(T_world_ego.inverse() @ box.T_frame_box),
+            **_pose_row(T_ego_world @ box.T_frame_box),
             "num_interior_pts": int(counts[number]) if number < len(counts) else 0,
         }
 

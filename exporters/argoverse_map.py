@@ -116,8 +116,8 @@ def _raised(outline: Array, ground: Array) -> Array:
     """An outline [n, 2] at the heights of the nearest points of lanes."""
     if not len(ground):
         return np.column_stack([outline, np.zeros(len(outline))])
-    gaps = ((outline[:, None] - ground[None, :, :2]) ** 2).sum(axis=2)
-    return np.column_stack([outline, ground[gaps.argmin(axis=1), 2]])
+    x, y = (outline[:, None, axis] - ground[:, axis] for axis in range(2))
+    return np.column_stack([outline, ground[(x * x + y * y).argmin(axis=1), 2]])
 
 
 def _points(points: Array) -> list[dict[str, float]]:

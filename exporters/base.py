@@ -1,6 +1,6 @@
 """Base class of exporters, with defaults for the optional members of ``Exporter``."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from fnmatch import fnmatchcase
 from typing import ClassVar, TypeVar, get_args
 
@@ -67,6 +67,12 @@ class ExporterBase(Strict):
     annotators: ClassVar[frozenset[str]] = frozenset()
     """Names of the annotators that it reads, whatever its fields are."""
 
+    holds_twice: ClassVar[bool] = False
+    """Whether it can hold a doubled reading twice; see ``check_delivery``."""
+
+    shows_truth: ClassVar[bool] = False
+    """Whether it shows the world as it is, also readings that are lost."""
+
     own_classes: ClassVar[bool] = False
     """Whether the format prescribes its classes, whatever its fields are; see ``Exporter``."""
 
@@ -120,6 +126,28 @@ class AssetExporter(ExporterBase):
         return self._assets
 
 
+def check_classes(exporter: str, info: interfaces.DatasetInfo, known: Collection[str]) -> None:
+    """Reject a data set without a single object that a format has a class for.
+
+    Args:
+        exporter: Its name.
+        info: Facts about the data set.
+        known: Categories with a class; case and underscores do not count.
+
+    Raises:
+        ConfigError: the text names them.
+    """
+    if not {*map(_plain, known)} & {*map(_plain, info.categories)}:
+        raise errors.ConfigError(
+            f"exporter '{exporter}': no category of the data set has a class in this format; "
+            f"expected at least one of: {', '.join(known)}. Use coco for other categories"
+        )
+
+
+def _plain(category: str) -> str:
+    return category.lower().replace("_", " ")
+
+
 def check_image_formats(exporter: interfaces.Exporter, info: interfaces.DatasetInfo) -> None:
     """Reject photographs in files that a format cannot hold.
 
@@ -135,6 +163,44 @@ def check_image_formats(exporter: interfaces.Exporter, info: interfaces.DatasetI
                 f"exporter takes {', '.join(sorted(known))} only; change rgb_encoding of the "
                 "sensor, or export in a format that takes them, such as coco, yolo or huggingface"
             )
+
+
+def check_delivery(exporter: interfaces.Exporter, info: interfaces.DatasetInfo) -> None:
+    """Reject lost or doubled readings that a format cannot express.
+
+    A lost reading is missing, as of a sensor that does not read at a step. Most formats hold one
+    reading of a sensor per sample. Rows of devices are lost and doubled in their files already.
+
+    Raises:
+        ConfigError: the text names sensor and remedy.
+    """
+    if getattr(exporter, "shows_truth", False):
+        return
+    place = f"exporter '{exporter.type}': sensor '{{}}': faults.delivery.{{}}: {{}}; set it to 0"
+    for sensor in info.sensors:
+        if "lost" in sensor.faults and sensor.channels and "language" in exporter.needs:
+            fact = "texts may be about two images, of which one may be lost"
+            raise errors.ConfigError(place.format(sensor.name, "lost", fact))
+        if "doubled" in sensor.faults and sensor.modality in _held_once(exporter):
+            remedy = (
+                ", leave the sensor out with the field cameras or sensors of the exporter, or "
+                "export mcap"
+            )
+            fact = "the format holds a reading once"
+            raise errors.ConfigError(place.format(sensor.name, "doubled", fact) + remedy)
+
+
+def _held_once(exporter: interfaces.Exporter) -> set[interfaces.Modality]:
+    """Kinds of sensors of which a format holds no reading twice."""
+    if getattr(exporter, "holds_twice", False):
+        return set()
+    stated: Conventions | None = getattr(exporter, "conventions", None)
+    kinds = set()
+    if stated is None or stated.pixel_centre or stated.box or stated.lens:
+        kinds.add(interfaces.Modality.CAMERA)
+    if stated is None or stated.ring or stated.intensity or hasattr(exporter, "lidar"):
+        kinds.add(interfaces.Modality.LIDAR)
+    return kinds
 
 
 def select_names(patterns: Sequence[str], known: Sequence[str], place: str) -> tuple[str, ...]:

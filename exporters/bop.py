@@ -47,6 +47,7 @@ from pydantic import PrivateAttr
 from gen_data.core import bounded_cache, boxes, capture, se3
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.reported import reported
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters import base, fragments, mask_png, rigid_models, rle, sensor_selection
@@ -241,7 +242,7 @@ def _model_facts(
 
 def _image_facts(info: DatasetInfo, sample: Sample, camera: str) -> dict[str, Any]:
     seen = sample.truth[camera].camera
-    T_camera_world = seen.T_world_camera.inverse()
+    T_camera_world = reported(seen).T_world_camera.inverse()
     return {
         "index": sample.index,
         "split": sample.split,

@@ -27,6 +27,7 @@ from typing import Any, ClassVar, Literal
 
 from gen_data.core import capture, errors, serialization
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import reported
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.exporters import base, image_files, sensor_selection, sequences
@@ -127,7 +128,7 @@ def _row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
     for name in _cameras(info):
         if name in sample.truth and name in photographed:
             camera = sample.scene_of(name).camera(name)
-            eye = camera.T_world_camera.inverse()
+            eye = reported(camera).T_world_camera.inverse()
             pose = " ".join(
                 repr(round(v, 12) + 0.0) for v in (*eye.quaternion_wxyz, *eye.translation_m)
             )

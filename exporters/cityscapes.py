@@ -53,7 +53,12 @@ from gen_data.exporters import base, fragments, image_files, label_png, label_re
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.sensor_selection import pinhole_camera, require_channels, rgb_cameras
+from gen_data.exporters.sensor_selection import (
+    check_calibrations,
+    pinhole_camera,
+    require_channels,
+    rgb_cameras,
+)
 from gen_data.exporters.sequences import (
     camera_mount,
     check_frame_names,
@@ -85,8 +90,9 @@ class Cityscapes(base.AssetExporter):
 
         Raises:
             ConfigError: the camera is missing, is not a pinhole or lacks a channel, or there are
-                too many samples.
+                too many samples or no classes.
         """
+        base.check_classes(self.type, info, city_classes().categories)
         camera = pinhole_camera(info, self.camera, self.type)
         needed = [Channel.INSTANCE, *([Channel.DISPARITY] if self.right else [])]
         require_channels(info, camera, needed, self.type)
@@ -96,6 +102,7 @@ class Cityscapes(base.AssetExporter):
                 f"exporter '{self.type}': right: '{self.right}' is not another camera that writes "
                 f"the rgb channel; expected one of: {', '.join(others) or 'none'}"
             )
+        check_calibrations(info, [camera, self.right] if self.right else [camera], self.type)
         check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

@@ -87,6 +87,7 @@ from gen_data.core import boxes, intrinsics, se3, serialization
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.motion import Twist
+from gen_data.core.reported import reported
 from gen_data.core.sample import (
     ANNOTATION_STRIDE,
     ImageTruth,
@@ -108,7 +109,7 @@ from gen_data.exporters.fragments import (
     write_fragments,
 )
 from gen_data.exporters.lens_fields import lens_fields
-from gen_data.exporters.sensor_selection import check_channels, instant_s, photographs
+from gen_data.exporters.sensor_selection import check_channels, photographs, stamp_s
 
 DECIMALS = 9
 """Decimals of metres, matrices and fractions: far below any measurement error."""
@@ -332,14 +333,14 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "K": _rows(camera.intrinsics.matrix()),
         **lens_fields(camera.intrinsics.lens),
         **_shutter(camera.shutter),
-        "T_world_camera": _rows(camera.T_world_camera.matrix()),
+        "T_world_camera": _rows(reported(camera).T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
     } | _image_keys(sample.scene_of(sensor), sample.truth[sensor], camera.intrinsics)
     if info.steps_per_scene > 1:
         row["sequence_id"] = sequences.sequence_number(info, sample.index)
         row["frame_id"] = sample.index % info.steps_per_scene
-        row["time_s"] = round(instant_s(sample, sensor), DECIMALS)
+        row["time_s"] = round(stamp_s(sample, sensor), DECIMALS)
     return row
 
 

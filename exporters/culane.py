@@ -41,6 +41,7 @@ from gen_data.exporters.lane_lines import (
     lane_lines,
 )
 from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.road_map import StreetExporter
 from gen_data.exporters.sensor_selection import check_channels, photographs
 from gen_data.exporters.sequences import (
     FRAMES,
@@ -55,7 +56,7 @@ ROWS_PX, WIDTH_PX = 10, 16
 """Distance of the rows; width of the lines of masks."""
 
 
-class CULane(base.AssetExporter):
+class CULane(StreetExporter):
     """CULane: the four lines of lanes next to the camera, as points and as masks."""
 
     type: Literal["culane"] = "culane"
@@ -73,7 +74,7 @@ class CULane(base.AssetExporter):
             ConfigError: no sensor writes the rgb channel, or Shapely is missing.
         """
         check_channels(info, (), self.type)
-        base.check_installed(self.type, "shapely")
+        super().check(info)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write text and mask of each photograph."""

@@ -50,6 +50,7 @@ from numpy.typing import NDArray
 from gen_data.core import errors, intrinsics, optional_packages, se3, serialization
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import reported
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.exporters import base, fragments, image_files, npz
 from gen_data.exporters.conventions import Conventions
@@ -207,7 +208,7 @@ def _camera_arrays(truth: ImageTruth) -> dict[str, NDArray[Any]]:
     """Arrays of an image that are not a channel."""
     seen = [thing for thing in truth.objects if thing.box is not None]
     background: dict[str, Any] = {"idx": 0, "category_id": 0, "name": "background"}
-    T_world_camera = np.round(truth.camera.T_world_camera.matrix(), 9) + 0.0
+    T_world_camera = np.round(reported(truth.camera).T_world_camera.matrix(), 9) + 0.0
     return {
         "instance_attribute_maps": _text([background, *(_attributes(thing) for thing in seen)]),
         "campose": _text([_camera_pose(truth, T_world_camera)]),

@@ -42,6 +42,7 @@ from pydantic import Field
 from gen_data.core import boxes, capture
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.lens import Lens
+from gen_data.core.reported import reported
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.exporters import base, fragments, ignored_regions, rle, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
@@ -54,7 +55,7 @@ from gen_data.exporters.parquet_tables import (
     table_schema,
     value_feature,
 )
-from gen_data.exporters.sensor_selection import instant_s, photographs, rgb_camera, rgb_cameras
+from gen_data.exporters.sensor_selection import photographs, rgb_camera, rgb_cameras, stamp_s
 
 if TYPE_CHECKING:
     import pyarrow
@@ -287,11 +288,11 @@ def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "scene": sample.scene_index,
         "view": sample.view_index,
         "step": sample.step_index,
-        "time_s": round(instant_s(sample, sensor), DECIMALS),
+        "time_s": round(stamp_s(sample, sensor), DECIMALS),
         "sensor": sensor,
         "K": camera.intrinsics.matrix().ravel().tolist(),
         **({"lens": _lens(camera.intrinsics.lens)} if has_bent_camera(info) else {}),
-        "T_world_camera": camera.T_world_camera.matrix().ravel().tolist(),
+        "T_world_camera": reported(camera).T_world_camera.matrix().ravel().tolist(),
         "objects": {name: [o[name] for o in objects] for name in object_features(info)},
     }
 

@@ -159,6 +159,7 @@ class Kitti(base.ExporterBase):
             if sensor_selection.has_scans(shard_dir, lidar, sample.index):
                 points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
                 write_bytes(folder / f"velodyne/{frame}.bin", point_cloud_io.xyzi_bytes(points))
+                T_camera_velo = self._velodyne_pose(info, sample, true=True)
                 members, unseen = point_members(points, truth, rows, T_camera_velo)
                 rows = without_returns(rows, unseen, truth)
                 labels = point_labels(points, members, rows)
@@ -188,11 +189,12 @@ class Kitti(base.ExporterBase):
     def _lidar(self, info: DatasetInfo) -> str:
         return sensor_selection.laser_scanner(info, self.lidar, self.type)
 
-    def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> se3.Array:
-        """``T_camera_velo`` of the velodyne folder's points, [3, 4]."""
+    def _velodyne_pose(self, info: DatasetInfo, sample: Sample, *, true: bool = False) -> se3.Array:
+        """``T_camera_velo`` of the velodyne folder's points, [3, 4], as calibrated or ``true``."""
         lidar = self._lidar(info)
         if lidar:
-            return point_cloud_io.T_camera_lidar(sample, self._camera(info), lidar)[:3]
+            camera = self._camera(info)
+            return point_cloud_io.T_camera_lidar(sample, camera, lidar, true=true)[:3]
         return T_CAMERA_FORWARD
 
     def _links(

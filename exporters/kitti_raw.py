@@ -117,7 +117,8 @@ class KittiRaw(base.ExporterBase):
             ConfigError: a sensor is missing, a camera is not a pinhole, or there are too many
                 sequences.
         """
-        self._cameras(info)
+        cameras = self._cameras(info).values()
+        sensor_selection.check_calibrations(info, cameras, self.type)
         if not sensor_selection.laser_scanner(info, self.lidar, self.type):
             raise ConfigError(
                 f"exporter '{self.type}': there is no lidar; add a sensor of that type"
@@ -180,15 +181,16 @@ class KittiRaw(base.ExporterBase):
         lidar = sensor_selection.laser_scanner(info, self.lidar, self.type)
         carrier = camera_mount(sample.scene, cameras["02"]).rig
         unit = navigation_mount(sample.scene, self.oxts, carrier, self.type)
+        truly = navigation_mount(sample.scene, self.oxts, carrier, self.type, true=True)
         row = frame_facts(info, sample) | {
-            "time_s": sample.scene.time_s,
+            "time_s": sensor_selection.stamp_s(sample, self.oxts),
             "cameras": {
-                number: sensor_selection.instant_s(sample, name)
+                number: sensor_selection.stamp_s(sample, name)
                 for number, name in cameras.items()
                 if name in sample.truth
             },
             "scan": None,
-            "oxts": oxts_row(rig_motion(sample.scene, unit), self.origin_deg),
+            "oxts": oxts_row(rig_motion(sample.scene, truly), self.origin_deg),
             "boxes": tracklets.frame_boxes(sample, cameras["02"], lidar),
             "calibration": calibration_texts(sample, cameras, lidar, unit),
         }
@@ -196,7 +198,7 @@ class KittiRaw(base.ExporterBase):
             points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
             path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
             write_bytes(path, point_cloud_io.xyzi_bytes(points))
-            row["scan"] = sweep_times_s(points, sensor_selection.instant_s(sample, lidar))
+            row["scan"] = sweep_times_s(points, sensor_selection.stamp_s(sample, lidar))
         return row
 
     def _write_grey(self, cameras: Mapping[str, str], sample: Sample, shard_dir: Path) -> None:

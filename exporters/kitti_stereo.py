@@ -59,7 +59,8 @@ class KittiStereo(base.ExporterBase):
             ConfigError: there is no pair of cameras, one is not a pinhole, or there are too many
                 samples.
         """
-        self._pair(info)
+        pair = self._pair(info).values()
+        sensor_selection.check_calibrations(info, pair, self.type)
         sequences.check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

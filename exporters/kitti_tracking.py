@@ -35,7 +35,12 @@ from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.kitti_raw import Latitude, Longitude, projection
 from gen_data.exporters.oxts import navigation_mount, oxts_row, rig_motion
 from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
-from gen_data.exporters.sensor_selection import has_scans, laser_scanner, pinhole_camera
+from gen_data.exporters.sensor_selection import (
+    check_calibrations,
+    has_scans,
+    laser_scanner,
+    pinhole_camera,
+)
 
 SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""
@@ -86,7 +91,7 @@ class KittiTracking(base.ExporterBase):
             ConfigError: a sensor is not there, a camera is not a pinhole, or there are too many
                 sequences.
         """
-        self._cameras(info)
+        check_calibrations(info, self._cameras(info).values(), self.type)
         laser_scanner(info, self.lidar, self.type)
         sequences.check_sequence_count(info, SEQUENCES_MAX, self.type)
 
@@ -127,11 +132,12 @@ class KittiTracking(base.ExporterBase):
         cameras, scene = self._cameras(info), sample.scene
         carrier = sequences.camera_mount(scene, cameras["02"]).rig
         unit = navigation_mount(scene, self.oxts, carrier, self.type)
+        truly = navigation_mount(scene, self.oxts, carrier, self.type, true=True)
         truth = sample.truth[cameras["02"]]
         things = {thing.instance.instance_id: thing for thing in truth.objects}
         return sequences.frame_facts(info, sample) | {
             "cameras": [number for number, name in cameras.items() if name in sample.truth],
-            "oxts": oxts_row(rig_motion(scene, unit), self.origin_deg),
+            "oxts": oxts_row(rig_motion(scene, truly), self.origin_deg),
             "calib": calib_text(scene, cameras, laser_scanner(info, self.lidar, self.type), unit),
             "labels": [
                 tracking_label(row, things[instance_id])

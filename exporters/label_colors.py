@@ -1,11 +1,37 @@
-"""Colours of label images."""
+"""Colours of label images, recordings and previews; ids have the same colour in all of them."""
 
+import colorsys
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.config.data_files import load_data
+
 UInt8 = NDArray[np.uint8]
+Rgb = tuple[int, int, int]
+GOLDEN_RATIO_CONJUGATE = 0.618033988749895
+"""Step around the hue circle that keeps the hues of successive ids far apart."""
+UNLABELLED: Rgb = (120, 120, 120)
+SURFACE_COLORS: Mapping[str, Sequence[int]] = load_data(__package__, "surface_colors")
+"""SRGB colours of objects and ground without a category, by surface."""
+
+
+def id_color(number: int) -> Rgb:
+    """SRGB colour of an id; black for 0."""
+    if number == 0:
+        return (0, 0, 0)
+    hue = (number * GOLDEN_RATIO_CONJUGATE) % 1.0
+    red, green, blue = colorsys.hsv_to_rgb(hue, 0.62 + 0.3 * (number % 2), 0.98)
+    return (round(255 * red), round(255 * green), round(255 * blue))
+
+
+def color_ids(ids: NDArray[np.integer]) -> UInt8:
+    """Colour an id image [h, w], uint8 [h, w, 3]."""
+    table = np.array([id_color(i) for i in range(int(ids.max(initial=0)) + 1)], np.uint8)
+    colored: UInt8 = table[ids]
+    return colored
 
 
 @cache

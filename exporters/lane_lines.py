@@ -4,16 +4,18 @@ Pixels and visibility are from the annotation ``lanes``. Places follow from the 
 scene, which are projected again.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.lane_geometry import LaneBorder, lane_borders
-from gen_data.core.lane_projection import project_border
+from gen_data.core.lane_geometry import lane_borders
+from gen_data.core.lane_projection import project_borders
 from gen_data.core.sample import BorderTruth, Sample
 from gen_data.core.scene import Camera, Lane, Scene
 from gen_data.core.se3 import SE3, Array
@@ -125,9 +127,8 @@ def lane_lines(
     T_level_camera = level_pose(scene, truth.camera)
     borders = {b.name: (k, b) for k, b in enumerate(lane_borders(scene.lanes), 1)}
     lines = []
-    for stretch in truth.borders or ():
+    for stretch, p_camera in _places(sample, sensor):
         number, border = borders[stretch.border]
-        p_camera = _places(scene, truth.camera, border, stretch)
         points_m = T_level_camera.apply(p_camera)
         order = slice(None) if points_m[0, 0] <= points_m[-1, 0] else slice(None, None, -1)
         paint = _common_paint(dividers[border.name], truth.camera.T_world_camera.apply(p_camera))
@@ -148,30 +149,34 @@ def columns_at(points_px: Array, rows: Sequence[int]) -> list[float]:
     Of several crossings of a row, the one nearest to the start of the line is listed.
     """
     u, v = (np.asarray(points_px)[:, k] - 0.5 for k in (0, 1))
-    columns: list[float] = []
-    for row in rows:
-        crossing = np.flatnonzero((v[:-1] - row) * (v[1:] - row) <= 0.0)
-        if len(crossing) == 0:
-            columns.append(ABSENT)
-            continue
-        k = crossing[0]
-        share = (row - v[k]) / (v[k + 1] - v[k]) if v[k + 1] != v[k] else 0.0
-        columns.append(round(float(u[k] + share * (u[k + 1] - u[k])), 2) + 0.0)
-    return columns
+    wanted = np.array(rows)
+    crossing = (v[:-1] - wanted[:, None]) * (v[1:] - wanted[:, None]) <= 0.0
+    k = crossing.argmax(axis=1)
+    rise = v[k + 1] - v[k]
+    share = np.where(rise != 0.0, (wanted - v[k]) / np.where(rise != 0.0, rise, 1.0), 0.0)
+    found = (u[k] + share * (u[k + 1] - u[k])).tolist()
+    return [round(c, 2) + 0.0 if is_met else ABSENT
+            for c, is_met in zip(found, crossing.any(axis=1).tolist(), strict=True)]  # fmt: skip
 
 
-def _places(scene: Scene, camera: Camera, border: LaneBorder, stretch: BorderTruth) -> Array:
-    """Points [n, 3] of a stretch in the camera frame: of the border, where it is projected to."""
-    p_camera, uv = project_border(scene, camera, border)
-    found = np.isfinite(uv).all(axis=1)
-    p_camera, uv = p_camera[found], uv[found]
-    wanted = np.array(stretch.points_px)
-    keys, own = _keys(uv), _keys(wanted)
-    order = np.argsort(keys, kind="stable")
-    rows = order[np.minimum(np.searchsorted(keys, own, sorter=order), len(keys) - 1)]
-    for k in np.flatnonzero(keys[rows] != own):
-        rows[k] = ((uv - wanted[k]) ** 2).sum(axis=1).argmin()
-    return np.asarray(p_camera[rows])
+def _places(sample: Sample, sensor: str) -> Iterator[tuple[BorderTruth, Array]]:
+    """Stretches of an image, and their points in the camera frame, where these are projected to."""
+    scene, truth = sample.scene_of(sensor), sample.truth[sensor]
+    shown = {stretch.border for stretch in truth.borders or ()}
+    borders = [border for border in lane_borders(scene.lanes) if border.name in shown]
+    numbers, p_camera, uv = project_borders(scene, truth.camera, borders, math.inf)
+    keys = _keys(uv)
+    ends = np.searchsorted(numbers, [k << 32 for k in range(len(borders) + 1)]).tolist()
+    ranges = {b.name: slice(*e) for b, e in zip(borders, pairwise(ends), strict=True)}
+    for stretch in truth.borders or ():
+        one = ranges[stretch.border]
+        wanted = np.array(stretch.points_px)
+        known, own = keys[one], _keys(wanted)
+        order = np.argsort(known, kind="stable")
+        rows = order[np.minimum(np.searchsorted(known, own, sorter=order), len(known) - 1)]
+        for k in np.flatnonzero(known[rows] != own):
+            rows[k] = ((uv[one] - wanted[k]) ** 2).sum(axis=1).argmin()
+        yield stretch, p_camera[one][rows]
 
 
 def _keys(uv: Array) -> NDArray[np.int64]:
@@ -184,9 +189,10 @@ def _common_paint(divider: Divider, p_world: Array) -> Paint:
     """The most frequent paint at points [n, 3]."""
     corners = np.asarray(divider.border.points_m)
     gaps = ((p_world[:, None, :2] - corners[None, :, :2]) ** 2).sum(axis=2)
-    counts = Counter(divider.paint[k] for k in gaps.argmin(axis=1).tolist())
-    common: Paint = max(counts, key=lambda paint: counts[paint])
-    return common
+    counts: Counter[Paint] = Counter()
+    for corner, count in Counter(gaps.argmin(axis=1).tolist()).items():
+        counts[divider.paint[corner]] += count
+    return max(counts, key=lambda paint: counts[paint])
 
 
 def _numbered(lines: Sequence[LaneLine]) -> Iterator[LaneLine]:

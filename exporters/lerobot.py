@@ -120,6 +120,12 @@ class LeRobot(base.AssetExporter):
                     f"but frames are {info.step_s:g} s apart; omit its rate_hz, or list the other "
                     "cameras in the exporter's cameras"
                 )
+            if "lost" in info.sensor(name).faults:
+                raise errors.ConfigError(
+                    f"exporter '{self.type}': sensor '{name}': faults.delivery.lost: frames have "
+                    "an image of every camera; set it to 0, or list the other cameras in the "
+                    "exporter's cameras"
+                )
 
     def check_scene(self, scene: Scene) -> None:
         """Reject scenes without the arm.

@@ -47,7 +47,7 @@ from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.npz import npz_bytes
 from gen_data.exporters.nuscenes_classes import category_of
 from gen_data.exporters.point_cloud_io import read_points
-from gen_data.exporters.sensor_selection import has_scans, instant_s, laser_scanner
+from gen_data.exporters.sensor_selection import has_scans, instant_s, laser_scanner, stamp_s
 from gen_data.exporters.sequences import (
     Frame,
     Mount,
@@ -137,11 +137,11 @@ class LidarFlow(base.AssetExporter):
             if not has_scans(shard_dir, lidar, sample.index):
                 continue
             points = read_points(shard_dir, lidar, sample.index)
-            row = frame_facts(info, sample) | {"time_s": instant_s(sample, lidar)}
+            row = frame_facts(info, sample) | {"time_s": stamp_s(sample, lidar)}
             rows.append(row)
             arrays = {"position_m": points["position_m"]}
             if row["step"] + period_steps < info.steps_per_scene:
-                now = scene_at(sample.scene_of(lidar), row["time_s"])
+                now = scene_at(sample.scene_of(lidar), instant_s(sample, lidar))
                 delays_s = points["time_s"] - 0.5 * now.lidar(lidar).sweep_s
                 delays_s = np.zeros(len(points)) if at_once else delays_s.astype(np.float64)
                 then = scene_at(now, now.time_s + period_steps * info.step_s)
@@ -228,7 +228,7 @@ def annotation_bytes(scene: Scene, lidar: str, points: NDArray[np.void], flow: S
     """Encode an annotation of Argoverse 2's challenge; ``scene`` is at the scan's instant."""
     import pyarrow as pa
 
-    mount = lidar_mount(scene, lidar)
+    mount = lidar_mount(scene, lidar, true=True)
     T_ego_lidar = relative_pose(scene, Mount(mount.rig, SE3()), mount)
     p_ego = T_ego_lidar.apply(points["position_m"].astype(np.float64))
     flow_ego = np.asarray(T_ego_lidar.rotate(flow.flow_m)).astype(np.float32)

@@ -32,13 +32,14 @@ import numpy as np
 from pydantic import Field
 
 from gen_data.core.errors import ConfigError, did_you_mean, list_names
-from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.core.lane_geometry import lane_borders
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Lane, Scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.exporters import base, fragments
 from gen_data.exporters.conventions import SAMPLE, Conventions
-from gen_data.exporters.road_map import Geometry, RoadMap, check_street, lane_area, road_map
+from gen_data.exporters.road_map import Geometry, StreetExporter, drivable_areas, lane_area
 from gen_data.exporters.sequences import write_json, write_text
 
 CLASSES = ("divider", "ped_crossing", "boundary")
@@ -50,7 +51,7 @@ SHORT_M = 0.05
 """Shorter pieces of lines are left out."""
 
 
-class MapVectors(base.AssetExporter):
+class MapVectors(StreetExporter):
     """Dividers, crosswalks, boundaries and centre lines around the ego, for MapTR and alike."""
 
     type: Literal["map_vectors"] = "map_vectors"
@@ -63,22 +64,13 @@ class MapVectors(base.AssetExporter):
     axes: Literal["ego", "lidar"] = Field("ego")
     """Axes of the vectors: X forward, Y left, or X right, Y forward."""
 
-    def check(self, info: DatasetInfo) -> None:
-        """Reject a system without Shapely.
-
-        Raises:
-            ConfigError: Shapely is missing.
-        """
-        del info
-        base.check_installed(self.type, "shapely")
-
     def check_scene(self, scene: Scene) -> None:
         """Reject scenes without a street or a rig.
 
         Raises:
             ConfigError: the text names the missing element.
         """
-        check_street(scene, self.type)
+        super().check_scene(scene)
         self._ego(scene)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -94,7 +86,7 @@ class MapVectors(base.AssetExporter):
             scene = sample.scene
             self.check_scene(scene)
             if latest is None or latest[0] != scene.lanes:
-                latest = scene.lanes, world_lines(road_map(scene, self.library))
+                latest = scene.lanes, world_lines(scene, self.library)
             T_world_ego = level_pose(scene.rig_pose(self._ego(scene)))
             row = {
                 "index": sample.index,
@@ -167,15 +159,17 @@ def level_pose(pose: SE3) -> SE3:
     return SE3.about_z(yaw, pose.translation_m).rounded()
 
 
-def world_lines(roads: RoadMap) -> dict[str, list[Geometry]]:
+def world_lines(scene: Scene, assets: AssetLibrary) -> dict[str, list[Geometry]]:
     """Lines and areas of the world by class: dividers, boundaries and centre lines are lines."""
     import shapely
 
-    dividers = [np.asarray(d.border.points_m)[:, :2] for d in roads.dividers
-                if d.border.kind != "edge"]  # fmt: skip
-    rings = [ring[::-1] for area in roads.drivable for ring in (area.exterior, *area.holes)]
-    driving = [lane for lane in roads.lanes if lane.kind == "driving"]
-    crosswalks = [lane for lane in roads.lanes if lane.kind == "crosswalk"]
+    dividers = [np.asarray(border.points_m)[:, :2] for border in lane_borders(scene.lanes)
+                if border.kind != "edge"]  # fmt: skip
+    areas = drivable_areas(scene, assets)
+    rings = [ring[::-1] for area in areas for ring in (area.exterior, *area.holes)]
+    lanes = [lane for lane in scene.lanes if len(lane.center_m) > 1]
+    driving = [lane for lane in lanes if lane.kind == "driving"]
+    crosswalks = [lane for lane in lanes if lane.kind == "crosswalk"]
     return {
         "divider": _merged([shapely.LineString(line) for line in dividers]),
         "ped_crossing": [shapely.Polygon(lane_area([lane]).exterior) for lane in crosswalks],

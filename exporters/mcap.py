@@ -17,10 +17,12 @@ topic                           message (Protobuf schema ``foxglove.*``)
                                 category, name and instance id as metadata
 ==============================  =================================================================
 
-Every sequence starts at 0:00 UTC of 1 January 2020. Log times and times in messages are equal: each
-sensor has the instant of its reading, a scanner the middle of its sweep. ``time_s`` of points
-counts from there: stamp plus time is the instant of the pulse, or from the start of the
-sweep (``point_time``). Messages are in order of time. Frames are called
+Every sequence starts at 0:00 UTC of 1 January 2020. Log times, publish times and times in messages
+are equal: each sensor has the instant of its reading, a scanner the middle of its sweep. ``time_s``
+of points counts from there: stamp plus time is the instant of the pulse, or from the start of the
+sweep (``point_time``). With a wrong clock, publish times and times in messages are the reported
+ones, and the transforms of that time are the true ones then; log times are arrivals by a true
+clock, and doubled readings arrive twice. Messages are in order of log time. Frames are called
 ``camera/<name>`` (X right, Y down, Z forward), ``lidar/<name>`` and ``rig/<name>`` (X forward,
 Y left, Z up).
 
@@ -44,9 +46,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from gen_data.core import capture, errors, intrinsics, se3, serialization
 from gen_data.core.boxes import OrientedBox
+from gen_data.core.capture import PointCloud, SensorReading
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import arrived_s, copies, reported, reported_s
 from gen_data.core.sample import ImageTruth, Sample
 from gen_data.core.scene import Camera, Instance, Lidar
+from gen_data.core.scene_time import scene_at
 from gen_data.exporters import base, fragments
 from gen_data.exporters.conventions import POINT_TIME, Conventions
 from gen_data.exporters.point_cloud_io import PointTime, count_times_from, read_points
@@ -86,6 +91,7 @@ class Mcap(base.ExporterBase):
     """
 
     type: Literal["mcap"] = "mcap"
+    holds_twice: ClassVar[bool] = True
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i in calibrations, i + 0.5 in annotations",
         box="corners along the edges of pixels",
@@ -134,13 +140,19 @@ class Mcap(base.ExporterBase):
 def _frame_row(sample: Sample) -> dict[str, Any]:
     """Times, poses, calibrations and boxes of a sample."""
     readings, clouds = sample.capture.readings, sample.capture.clouds
-    cameras = {name: readings[name].time_s for name in sorted(sample.truth)}
-    transforms: list[tuple[float, str, str, se3.SE3]] = []
-    for name, time_s in cameras.items():
-        transforms += _camera_transforms(sample.truth[name].camera, time_s)
-    for cloud in clouds.values():
-        transforms += _lidar_transforms(cloud.lidar, cloud.time_s)
     scene = sample.scene
+    cameras = {name: reported_s(readings[name]) for name in sorted(sample.truth)}
+    transforms: list[tuple[float, str, str, se3.SE3]] = []
+    for name, stamp_s in cameras.items():
+        camera = sample.truth[name].camera
+        camera = (
+            camera if stamp_s == readings[name].time_s else scene_at(scene, stamp_s).camera(name)
+        )
+        transforms += _camera_transforms(camera, stamp_s)
+    for name, cloud in clouds.items():
+        stamp_s, lidar = reported_s(cloud), cloud.lidar
+        lidar = lidar if stamp_s == cloud.time_s else scene_at(scene, stamp_s).lidar(name)
+        transforms += _lidar_transforms(lidar, stamp_s)
     transforms += [
         (scene.time_s, WORLD, f"rig/{rig.name}", scene.rig_pose(rig.name)) for rig in scene.rigs
     ]
@@ -152,12 +164,24 @@ def _frame_row(sample: Sample) -> dict[str, Any]:
             [time_ns, parent, child, *_pose_numbers(pose)]
             for (time_ns, child), (parent, pose) in sorted(unique.items(), key=_by_time_and_frame)
         ],
-        "cameras": {n: _camera_row(sample.truth[n], time_s) for n, time_s in cameras.items()},
+        "cameras": {n: _camera_row(sample.truth[n], stamp_s) for n, stamp_s in cameras.items()},
         "lidars": {
-            name: [_ns(cloud.time_s), cloud.lidar.sweep_s] for name, cloud in sorted(clouds.items())
+            name: [_ns(reported_s(cloud)), cloud.lidar.sweep_s]
+            for name, cloud in sorted(clouds.items())
         },
         "objects": [_object_row(thing, box) for thing, box in world_boxes(sample)],
+        **_arrivals({**readings, **clouds}),
     }
+
+
+def _arrivals(read: Mapping[str, SensorReading | PointCloud]) -> dict[str, dict[str, list[int]]]:
+    """``arrivals``: log times of readings, by sensor, unless they arrive once, at their stamp."""
+    times = {
+        name: [_ns(arrived_s(reading))] * copies(reading)
+        for name, reading in sorted(read.items())
+        if copies(reading) > 1 or arrived_s(reading) != reported_s(reading)
+    }
+    return {"arrivals": times} if times else {}
 
 
 def _by_time_and_frame(item: tuple[tuple[int, str], Any]) -> tuple[int, str]:
@@ -167,18 +191,18 @@ def _by_time_and_frame(item: tuple[tuple[int, str], Any]) -> tuple[int, str]:
 def _camera_transforms(camera: Camera, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:
     frame = f"camera/{camera.name}"
     if not camera.rig:
-        return [(time_s, WORLD, frame, camera.T_world_camera)]
+        return [(time_s, WORLD, frame, reported(camera).T_world_camera)]
     rig, T_rig_camera = f"rig/{camera.rig}", camera.T_rig_camera
     T_world_rig = camera.T_world_camera @ T_rig_camera.inverse()
-    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, T_rig_camera)]
+    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, reported(camera).T_rig_camera)]
 
 
 def _lidar_transforms(lidar: Lidar, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:
     frame = f"lidar/{lidar.name}"
     if not lidar.rig:
-        return [(time_s, WORLD, frame, lidar.T_world_lidar)]
+        return [(time_s, WORLD, frame, reported(lidar).T_world_lidar)]
     rig, T_world_rig = f"rig/{lidar.rig}", lidar.T_world_lidar @ lidar.T_rig_lidar.inverse()
-    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, lidar.T_rig_lidar)]
+    return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, reported(lidar).T_rig_lidar)]
 
 
 def world_boxes(sample: Sample) -> list[tuple[Instance, OrientedBox]]:
@@ -244,11 +268,14 @@ class _Event:
     """Messages of one kind at one instant; their content is read when they are written.
 
     Attributes:
+        time_ns: Time stamp.
+        logged_ns: Arrival.
         kind: ``transform``, ``camera``, ``lidar`` or ``objects``.
         key: Number of a transform, or name of a sensor.
     """
 
     time_ns: int
+    logged_ns: int
     frame: Frame
     kind: str
     key: Any
@@ -258,19 +285,20 @@ def _events(frame: Frame) -> Iterator[_Event]:
     """Everything that happens at a sample, transforms first."""
     row = frame.row
     for number, transform in enumerate(row["transforms"]):
-        yield _Event(transform[0], frame, "transform", number)
-    for name, camera in row["cameras"].items():
-        yield _Event(camera["time_ns"], frame, "camera", name)
-    for name, (time_ns, _) in row["lidars"].items():
-        yield _Event(time_ns, frame, "lidar", name)
-    yield _Event(row["time_ns"], frame, "objects", None)
+        yield _Event(transform[0], transform[0], frame, "transform", number)
+    stamps = [("camera", name, camera["time_ns"]) for name, camera in row["cameras"].items()]
+    stamps += [("lidar", name, time_ns) for name, (time_ns, _) in row["lidars"].items()]
+    for kind, name, time_ns in stamps:
+        for logged_ns in row.get("arrivals", {}).get(name, [time_ns]):
+            yield _Event(time_ns, logged_ns, frame, kind, name)
+    yield _Event(row["time_ns"], row["time_ns"], frame, "objects", None)
 
 
 def _write_file(info: DatasetInfo, path: Path, sequence: Sequence[Frame], exporter: Mcap) -> None:
     from mcap.writer import CompressionType, Writer
 
     # Sorting is stable: transforms stay before the messages that need them.
-    events = sorted((e for f in sequence for e in _events(f)), key=lambda e: e.time_ns)
+    events = sorted((e for f in sequence for e in _events(f)), key=lambda e: e.logged_ns)
     with path.open("wb") as file:
         writer = Writer(file, compression=CompressionType[exporter.compression.upper()])
         writer.start(profile="", library="gen-data")
@@ -282,7 +310,7 @@ def _write_file(info: DatasetInfo, path: Path, sequence: Sequence[Frame], export
         channels = _Channels(writer)
         for event in events:
             for topic, message in _messages(info, event, exporter.point_time):
-                channels.write(topic, message, event.time_ns)
+                channels.write(topic, message, event)
         writer.finish()
 
 
@@ -294,12 +322,12 @@ class _Channels:
         self._ids: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
 
-    def write(self, topic: str, message: Message, time_ns: int) -> None:
+    def write(self, topic: str, message: Message, event: _Event) -> None:
         if topic not in self._ids:
             schema = self._schema(message)
             self._ids[topic] = self._writer.register_channel(topic, "protobuf", schema)
         data = message.SerializeToString(deterministic=True)
-        self._writer.add_message(self._ids[topic], time_ns, data, time_ns)
+        self._writer.add_message(self._ids[topic], event.logged_ns, data, event.time_ns)
 
     def _schema(self, message: Message) -> int:
         from mcap_protobuf.schema import register_schema

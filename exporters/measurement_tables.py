@@ -22,11 +22,13 @@ from numpy.typing import NDArray
 from gen_data.core import capture, measurement_dtypes
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import DatasetInfo, SensorInfo, table_path
+from gen_data.core.reported import reported
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import SAMPLE, Conventions
 from gen_data.exporters.npz import npy_bytes
+from gen_data.exporters.sensor_selection import stamp_s
 from gen_data.exporters.sequences import write_json, write_text
 
 INDEX = "sample"
@@ -162,11 +164,11 @@ def _columns(info: DatasetInfo) -> dict[str, Any]:
 
 
 def _pose(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
-    device = sample.scene.device(sensor)
+    device = reported(sample.scene.device(sensor))
     return {
         "index": sample.index,
         "sequence": sample.index // info.steps_per_scene,
-        "time_s": sample.scene.time_s,
+        "time_s": stamp_s(sample, sensor),
         "model": device.model,
         "T_rig_device": device.T_rig_device.matrix().tolist(),
         "T_world_device": device.T_world_device.matrix().tolist(),

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from gen_data.core import capture, errors, scene
+from gen_data.core import capture, scene
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.exporters import base, image_files, sensor_selection, sequences
@@ -74,11 +74,7 @@ class MotChallenge(base.ExporterBase):
                 class in this format.
         """
         sensor_selection.rgb_camera(info, self.camera, self.type)
-        if not any(_class_of(category) for category in info.categories):
-            raise errors.ConfigError(
-                f"exporter '{self.type}': no category of the data set has a class in this format; "
-                f"expected at least one of: {', '.join(CLASSES)}. Use coco for other categories"
-            )
+        base.check_classes(self.type, info, CLASSES)
         sequences.check_sequence_count(info, SEQUENCES_MAX, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

@@ -118,12 +118,7 @@ class NuScenes(base.AssetExporter):
                 same channel, or no category has a class in this format.
         """
         self._channels(info)
-        known = nuscenes_classes.detectable_categories()
-        if not set(known) & set(info.categories):
-            raise ConfigError(
-                f"exporter '{self.type}': no category of the data set has a class in this format; "
-                f"expected at least one of: {', '.join(known)}. Use coco for other categories"
-            )
+        base.check_classes(self.type, info, nuscenes_classes.detectable_categories())
         check_pinholes(info, rgb_cameras(info), self.type)
         if self.map_expansion:
             base.check_installed(self.type, "shapely")

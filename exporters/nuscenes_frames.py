@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from gen_data.core import errors, intrinsics, motion, scene_time
 from gen_data.core.boxes import OrientedBox
+from gen_data.core.reported import delayed_s
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.exporters.nuscenes_classes import category_of
 from gen_data.exporters.nuscenes_files import quarter_turns, turned_pose
-from gen_data.exporters.sensor_selection import instant_s
+from gen_data.exporters.sensor_selection import instant_s, stamp_error_s
 from gen_data.exporters.sequences import (
     Mount,
     camera_mount,
@@ -62,11 +63,13 @@ def reading_row(
 ) -> dict[str, Any]:
     """Row of a reading: instant, pose of the ego, pose and size of the sensor.
 
+    With a wrong clock, the row has ``stamp_s``, the reported time, and the ego's pose at that time.
+
     Args:
         sample: Sample with the reading.
         channel: Channel of the sensor.
         ego: Rig that is the ego vehicle.
-        time_s: Instant of the reading.
+        time_s: True instant of the reading.
         T_global_world: Pose of the world in the global frame.
     """
     scene = sample.scene
@@ -74,11 +77,13 @@ def reading_row(
     T_ego_sensor = relative_pose(scene, Mount(ego, SE3()), mount)
     if channel.modality == "lidar":
         T_ego_sensor = turned_pose(T_ego_sensor, quarter_turns(T_ego_sensor)).rounded(9)
+    stamp_s = delayed_s(time_s, stamp_error_s(sample, channel.sensor))
     row = {
         "sensor": channel.sensor,
         "modality": channel.modality,
         "time_s": time_s,
-        "ego": pose_row(T_global_world @ rig_pose_at(scene, ego, time_s)),
+        **({"stamp_s": stamp_s} if stamp_s != time_s else {}),
+        "ego": pose_row(T_global_world @ rig_pose_at(scene, ego, stamp_s)),
         "mount": pose_row(T_ego_sensor),
         "intrinsic": [],
         "size_px": [0, 0],

@@ -237,20 +237,24 @@ class _Writer:
     def _named(self, layer: str, name: str) -> str:
         return self.token(layer, name) if name else ""
 
-    def _node(self, point: Sequence[float]) -> str:
-        x, y = (
-            round(float(p) - float(low), DECIMALS) + 0.0
-            for p, low in zip(point, self.low_m, strict=False)
-        )
-        if (x, y) not in self._nodes:
-            # Hashing the place of each would take longer than everything else.
-            made = self._nodes[x, y] = f"{self._node_token}{len(self._nodes):08x}"
-            self.layers["node"].append({"token": made, "x": x, "y": y})
-        return self._nodes[x, y]
+    def _nodes_at(self, points: Iterable[Sequence[float]]) -> list[str]:
+        """Tokens of the nodes at places, of which only x and y count; new ones are added."""
+        found, known, rows = [], self._nodes, self.layers["node"]
+        low_x, low_y = self.low_m.tolist()
+        for point in points:
+            x = round(point[0] - low_x, DECIMALS) + 0.0
+            y = round(point[1] - low_y, DECIMALS) + 0.0
+            token = known.get((x, y))
+            if token is None:
+                # Hashing the place of each would take longer than everything else.
+                token = known[x, y] = f"{self._node_token}{len(known):08x}"
+                rows.append({"token": token, "x": x, "y": y})
+            found.append(token)
+        return found
 
     def _ring(self, points: Array) -> list[str]:
         """Nodes of a ring; points that round to one node appear once."""
-        nodes = [self._node(point) for point in points[:, :2].tolist()]
+        nodes = self._nodes_at(points.tolist())
         return [node for k, node in enumerate(nodes) if node != nodes[k - 1]]
 
     def _polygon(self, area: Area, layer: str, name: object) -> str:
@@ -264,7 +268,7 @@ class _Writer:
 
     def _line(self, points: Array, layer: str, name: object) -> str:
         made = self.token("line", layer, name)
-        nodes = [self._node(point) for point in points[:, :2].tolist()]
+        nodes = self._nodes_at(points.tolist())
         self.layers["line"].append({"token": made, "node_tokens": nodes})
         return made
 
@@ -281,9 +285,9 @@ class _Writer:
     def _painted(self, divider: Divider | None) -> list[Row]:
         if divider is None:
             return []
-        points = zip(divider.border.points_m, divider.paint, strict=True)
-        return [{"node_token": self._node(point[:2]), "segment_type": segment_type(paint)}
-                for point, paint in points]  # fmt: skip
+        nodes = self._nodes_at(divider.border.points_m)
+        return [{"node_token": node, "segment_type": segment_type(paint)}
+                for node, paint in zip(nodes, divider.paint, strict=True)]  # fmt: skip
 
     def _drivable_at(self, point: Array) -> str:
         """Drivable area with the corner of a segment: the nearest one."""

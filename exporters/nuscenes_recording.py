@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from gen_data.exporters.nuscenes_tables import Row, Tokens
+from gen_data.exporters.sensor_selection import row_stamp_s
 from gen_data.exporters.sequences import Frame
 
 LIDAR_TOP = "LIDAR_TOP"
@@ -60,7 +61,7 @@ class Recording:
                 "sample",
                 {
                     "token": self._sample_token(k),
-                    "timestamp": self.time_us(row["readings"][LIDAR_TOP]["time_s"]),
+                    "timestamp": self.time_us(row_stamp_s(row["readings"][LIDAR_TOP])),
                     "scene_token": self.token("scene", self.number),
                     "prev": around[0],
                     "next": around[1],
@@ -120,7 +121,7 @@ class Recording:
             reading = frame.row["readings"][channel]
             following = min(bisect_left(self.keys, k), len(self.keys) - 1)
             is_key = self.keys[following] == k
-            stamp_us = self.time_us(reading["time_s"])
+            stamp_us = self.time_us(row_stamp_s(reading))
             ego_pose = {"token": tokens[n], "timestamp": stamp_us, **reading["ego"]}
             calibrated = {
                 "sensor_token": self.token("sensor", channel),

@@ -24,39 +24,21 @@ from typing import ClassVar, Literal
 
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.core.scene import Scene
 from gen_data.exporters import base, fragments, image_files
 from gen_data.exporters.conventions import NO_CONVENTIONS, Conventions
 from gen_data.exporters.opendrive_xml import opendrive_bytes
-from gen_data.exporters.road_map import check_street
+from gen_data.exporters.road_map import StreetExporter
 from gen_data.exporters.sequences import write_bytes, write_text
 
 WORLDS = "worlds"
 
 
-class OpenDrive(base.AssetExporter):
+class OpenDrive(StreetExporter):
     """OpenDRIVE 1.7: roads, lanes, junctions, heights, marks and crosswalks of each world."""
 
     type: Literal["opendrive"] = "opendrive"
     conventions: ClassVar[Conventions] = NO_CONVENTIONS
     image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
-
-    def check(self, info: DatasetInfo) -> None:
-        """Reject a system without Shapely.
-
-        Raises:
-            ConfigError: Shapely is missing.
-        """
-        del info
-        base.check_installed(self.type, "shapely")
-
-    def check_scene(self, scene: Scene) -> None:
-        """Reject scenes without a street.
-
-        Raises:
-            ConfigError: the text names the missing element.
-        """
-        check_street(scene, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the file of each world of the shard, and a line per sample.

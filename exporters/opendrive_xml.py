@@ -1,9 +1,11 @@
 """Text of an OpenDRIVE file: roads, their lanes, heights, marks and links, and junctions."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -18,6 +20,7 @@ REVISION = ("1", "7")
 DATE = "2020-01-01T00:00:00"
 LEVEL_M = 1e-5
 """Heights that follow from their neighbours within this have no record."""
+SPECIAL = re.compile('[&<>"]')
 MARK_M = 0.12
 MARKS = {
     ("solid", False): "solid", ("dashed", False): "broken",
@@ -92,9 +95,25 @@ def opendrive_bytes(scene: Scene, assets: AssetLibrary, name: str) -> bytes:
         _add_road(root, plan, streets, paint, crosswalks.get(plan.number, []))
     for junction, number in streets.junctions.items():
         _add_junction(root, junction, number, streets)
-    indent(root)
-    text: bytes = tostring(root, "utf-8")
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + text + b"\n"
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>']
+    _add_lines(lines, root, "")
+    return "\n".join([*lines, ""]).encode()
+
+
+def _add_lines(lines: list[str], element: Element, indent: str) -> None:
+    """Add the lines of an element without text; ``ElementTree`` takes three times as long."""
+    values = "".join([f' {key}="{_escape(value)}"' for key, value in element.items()])
+    if not len(element):
+        lines.append(f"{indent}<{element.tag}{values} />")
+        return
+    lines.append(f"{indent}<{element.tag}{values}>")
+    for child in element:
+        _add_lines(lines, child, indent + "  ")
+    lines.append(f"{indent}</{element.tag}>")
+
+
+def _escape(value: str) -> str:
+    return escape(value, {'"': "&quot;"}) if SPECIAL.search(value) else value
 
 
 def _streets(scene: Scene) -> Streets:

@@ -47,6 +47,7 @@ from gen_data.exporters.lane_lines import (
     vehicle_pose,
 )
 from gen_data.exporters.nuscenes_frames import intrinsic_rows
+from gen_data.exporters.road_map import StreetExporter
 from gen_data.exporters.sensor_selection import check_pinholes, photographs, rgb_cameras
 from gen_data.exporters.sequences import (
     FRAMES,
@@ -64,7 +65,7 @@ ATTRIBUTES = {-2: 1, -1: 2, 1: 3, 2: 4}
 DECIMALS = 4
 
 
-class OpenLane(base.AssetExporter):
+class OpenLane(StreetExporter):
     """OpenLane 1.x: lines of lanes in space and in images, with visibility of every point."""
 
     type: Literal["openlane"] = "openlane"
@@ -80,7 +81,7 @@ class OpenLane(base.AssetExporter):
             ConfigError: there is no photograph, a camera is not a pinhole, or Shapely is missing.
         """
         check_pinholes(info, rgb_cameras(info), self.type)
-        base.check_installed(self.type, "shapely")
+        super().check(info)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a file per photograph."""
@@ -118,7 +119,10 @@ def _path(info: DatasetInfo, sample: Sample, sensor: str) -> str:
 def frame(sample: Sample, sensor: str, lines: Iterable[LaneLine]) -> dict[str, Any]:
     """Content of the file of a photograph, without ``file_path``."""
     scene, camera = sample.scene_of(sensor), sample.truth[sensor].camera
-    T_vehicle_camera = vehicle_pose(scene, camera).inverse() @ RIG_AXES
+    T_vehicle_camera = vehicle_pose(scene, camera).inverse()
+    if camera.T_sensor_reported is not None:
+        T_vehicle_camera = T_vehicle_camera @ camera.T_sensor_reported
+    T_vehicle_camera = T_vehicle_camera @ RIG_AXES
     T_camera_level = (level_pose(scene, camera) @ RIG_AXES).inverse()
     return {
         "intrinsic": intrinsic_rows(camera.intrinsics),

@@ -18,6 +18,7 @@ import numpy as np
 
 from gen_data.core import errors, se3
 from gen_data.core.motion import STILL, Twist
+from gen_data.core.reported import reported
 from gen_data.core.scene import Scene
 from gen_data.exporters.sequences import Mount, mounted_pose
 
@@ -50,7 +51,9 @@ class RigMotion:
     twist: Twist
 
 
-def navigation_mount(scene: Scene, name: str, carrier: str, exporter: str) -> Mount:
+def navigation_mount(
+    scene: Scene, name: str, carrier: str, exporter: str, *, true: bool = False
+) -> Mount:
     """Mount of the navigation unit: the device of that name, or the rig itself if it is empty.
 
     Args:
@@ -58,6 +61,7 @@ def navigation_mount(scene: Scene, name: str, carrier: str, exporter: str) -> Mo
         name: Name of a device; empty = none.
         carrier: Rig to use without a device.
         exporter: Name in the error text.
+        true: Leave out the error of its calibration.
 
     Raises:
         ConfigError: there is no such device.
@@ -71,6 +75,7 @@ def navigation_mount(scene: Scene, name: str, carrier: str, exporter: str) -> Mo
             f"{', '.join(known) or 'none'}{errors.did_you_mean(name, known)}"
         )
     device = scene.device(name)
+    device = device if true else reported(device)
     return Mount(device.rig, device.T_rig_device)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.core import capture, errors, interfaces, scene, se3
+from gen_data.core.reported import reported
 from gen_data.core.sample import Sample
 
 PointTime = Literal["sweep_middle", "sweep_start"]
@@ -71,12 +72,15 @@ def xyzi_bytes(points: NDArray[np.void]) -> bytes:
     return np.column_stack([points["position_m"], points["intensity"]]).astype("<f4").tobytes()
 
 
-def T_camera_lidar(sample: Sample, camera: str, lidar: str) -> se3.Array:  # noqa: N802
-    """Transform from lidar to camera coordinates, 4 x 4.
+def T_camera_lidar(  # noqa: N802
+    sample: Sample, camera: str, lidar: str, *, true: bool = False
+) -> se3.Array:
+    """Transform from lidar to camera coordinates, 4 x 4, as calibrations state it, or the true one.
 
     On a common rig it is the rig's calibration, at whatever instants the two read.
     """
     view, scanner = sample.truth[camera].camera, scanner_at_sweep(sample, lidar)
+    view, scanner = (view, scanner) if true else (reported(view), reported(scanner))
     if view.rig and view.rig == scanner.rig:
         return (view.T_rig_camera.inverse() @ scanner.T_rig_lidar).matrix()
     return (view.T_world_camera.inverse() @ scanner.T_world_lidar).matrix()

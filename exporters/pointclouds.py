@@ -26,12 +26,13 @@ from numpy.typing import NDArray
 
 from gen_data.core import boxes, errors
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import reported
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Instance
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters import base, image_files, point_cloud_io
 from gen_data.exporters.conventions import POINT_TIME, READING, Conventions
-from gen_data.exporters.sensor_selection import has_scans, instant_s
+from gen_data.exporters.sensor_selection import has_scans, stamp_s
 
 FILE_POINT = np.dtype(
     [
@@ -110,11 +111,11 @@ class PointClouds(base.ExporterBase):
         scanner = point_cloud_io.scanner_at_sweep(sample, lidar)
         return {
             "index": sample.index,
-            "time_s": instant_s(sample, lidar),
+            "time_s": stamp_s(sample, lidar),
             "sweep_s": scanner.sweep_s,
             "point_time": self.point_time,
             "model": scanner.model,
-            "T_world_lidar": scanner.T_world_lidar.matrix().tolist(),
+            "T_world_lidar": reported(scanner).T_world_lidar.matrix().tolist(),
             "boxes": [
                 {
                     "instance": thing.instance_id,

@@ -5,7 +5,7 @@
     <split>/000000.rrd           the first samples of a split (``samples_per_file``), and so on
 
 Timelines are ``sample``, the index of the sample, and for sequences ``time`` [s], with one sequence
-after the other. Entities:
+after the other. Times are true, also of sensors with a wrong clock. Entities:
 
 ===================================  ==============================================================
 ``world``                            right-handed, Z up; ``/`` has the names of the classes
@@ -15,11 +15,19 @@ after the other. Entities:
 ``world/cameras/<name>/image/...``   ``rgb``, ``depth`` and ``measured_depth`` as PNG files,
                                      ``category``, ``boxes``, and ``keypoints/<instance id>``
 ``world/lidars/<name>``              pose, and points in its frame with classes
+``faults/<sensor>``                  true faults of a reading, as JSON; empty without any
+``world/lanes``                      borders of lanes, in each image as ``image/lanes``
+``world/tracks``                     tracked points, in each image as ``image/tracks``
+``world/occupancy``                  pose; ``voxels``: boxes of the voxels with a surface
+``.../image/depth_layers/<k>``       layers of depth, as PNG files
+``channels/<name>/...``              coloured: ``instance_layers/<k>``, ``material_layers/<k>`` and
+                                     ``seen_in_mirror``
 ===================================  ==============================================================
 
 Class ids are category ids, 0 is the background. Quaternions are x y z w, boxes have half sizes, and
-principal points have pixel centres at i + 0.5. Ignored objects have no boxes and keypoints. Other
-channels and devices are not in it; ``gen-data preview`` shows meshes.
+principal points have pixel centres at i + 0.5. Ignored objects have no boxes and keypoints. Lanes,
+tracks, occupancy, layers and mirrors are in it where the data set has them, in the colours of
+``gen-data preview``. Other channels and devices are not in it; ``gen-data preview`` shows meshes.
 
 Reference: https://rerun.io/docs/reference/types.
 """
@@ -36,8 +44,16 @@ from pydantic import Field
 from gen_data.core import capture, se3
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
+from gen_data.core.serialization import canonical_json
 from gen_data.core.skeletons import Skeleton, find_skeleton
-from gen_data.exporters import base, image_files, label_colors, point_cloud_io, rrd_container
+from gen_data.exporters import (
+    base,
+    image_files,
+    label_colors,
+    point_cloud_io,
+    rerun_labels,
+    rrd_container,
+)
 from gen_data.exporters.conventions import READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 
@@ -54,6 +70,7 @@ class Rerun(base.ExporterBase):
     """
 
     type: Literal["rerun"] = "rerun"
+    shows_truth: ClassVar[bool] = True
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i + 0.5",
         box="left, top, right, bottom along the edges of pixels",
@@ -101,15 +118,18 @@ class Rerun(base.ExporterBase):
 
 def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
     begins_s = (sample.index - sample.step_index) * info.step_s
+    tracks = None if sample.frame is None else sample.frame.tracks
     seen = {
         item.instance.instance_id: item
         for truth in sample.truth.values()
         for item in truth.objects
         if item.box3d_world is not None and not item.ignored
     }
+    faults = {name: canonical_json(found) for name, found in sample.capture.faults() if found}
     return {
         "index": sample.index,
         "split": sample.split,
+        **({"faults": faults} if faults else {}),
         "time_s": round(begins_s + sample.scene.time_s, 9),
         "boxes": [_box_row(seen[number]) for number in sorted(seen)],
         "rigs": {rig.name: _pose(sample.scene.rig_pose(rig.name)) for rig in sample.scene.rigs},
@@ -117,6 +137,9 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
             name: {
                 "time_s": round(begins_s + sample.capture.readings[name].time_s, 9),
                 **_image_row(sample, name),
+                **rerun_labels.image_row(
+                    sample.truth[name], None if tracks is None else tracks.sensors.get(name)
+                ),
             }
             for name in info.cameras
             if name in sample.truth
@@ -128,6 +151,7 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
             }
             for name, cloud in sorted(sample.capture.clouds.items())
         },
+        **rerun_labels.frame_row(sample.frame, sample.scene),
     }
 
 
@@ -201,17 +225,28 @@ def _chunks(
     for rig in sorted({name for row in rows for name in row["rigs"]}):
         mine = [{**row, "pose": row["rigs"][rig]} for row in rows if rig in row["rigs"]]
         yield _poses(info, f"world/rigs/{rig}", mine)
+    for path, found, columns in rerun_labels.frame_entities(rows):
+        yield _chunk(info, path, found, columns)
     for name in info.cameras:
         if images := _readings(rows, "cameras", name):
             yield from _camera_chunks(info, name, images, skeletons)
     for name in info.lidars:
         if scans := _readings(rows, "lidars", name):
             yield from _lidar_chunks(info, name, scans)
+    for name in sorted({name for row in rows for name in row.get("faults", ())}):
+        yield _fault_chunk(info, name, rows)
 
 
 def _readings(rows: Sequence[Row], kind: str, sensor: str) -> list[Row]:
     """Rows of the samples that a sensor reads, with the fields of its reading."""
     return [{**row, **row[kind][sensor]} for row in rows if sensor in row[kind]]
+
+
+def _fault_chunk(info: DatasetInfo, name: str, rows: Sequence[Row]) -> Any:
+    import rerun as rr
+
+    texts = [row.get("faults", {}).get(name, "") for row in rows]
+    return _chunk(info, f"faults/{name}", rows, rr.TextDocument.columns(text=texts))
 
 
 def _box_chunk(info: DatasetInfo, rows: Sequence[Row]) -> Any:
@@ -263,6 +298,12 @@ def _camera_chunks(
         )
         yield _chunk(info, f"{path}/image", rows, pinhole)
     for channel in info.media[name]:
+        if channel is capture.Channel.DEPTH_LAYERS or channel in rerun_labels.COLORED:
+            files = _files(info, name, channel, rows)
+            for entity, mine, columns in rerun_labels.channel_entities(
+                name, channel, rows, files, info.depth_scale_m
+            ):
+                yield _chunk(info, entity, mine, columns)
         columns = _channel_columns(info, name, channel, rows)
         if columns is not None:
             yield _chunk(info, f"{path}/image/{channel.value}", rows, columns)
@@ -276,6 +317,8 @@ def _camera_chunks(
             class_ids=numbers[:, 0].astype(np.uint16),
         )
         yield _chunk(info, f"{path}/image/boxes", rows, boxes.partition(counts))
+    for entity, mine, columns in rerun_labels.image_entities(f"{path}/image", rows):
+        yield _chunk(info, entity, mine, columns)
     for instance in sorted({key for row in rows for key in row["keypoints"]}, key=int):
         columns = _keypoint_columns([row["keypoints"].get(instance) for row in rows], skeletons)
         yield _chunk(info, f"{path}/image/keypoints/{instance}", rows, columns)
@@ -289,7 +332,7 @@ def _channel_columns(
     from rerun.components import ImageFormat
     from rerun.encodings import ChannelDatatype
 
-    paths = [info.media_path(row["shard"], name, channel, row["index"]) for row in rows]
+    paths = _files(info, name, channel, rows)
     types = [f"image/{info.encoding(name, channel).format}"] * len(paths)
     if channel is capture.Channel.RGB:
         return rr.EncodedImage.columns(blob=_blobs(paths), media_type=types)
@@ -305,6 +348,12 @@ def _channel_columns(
             ],
         )
     return None
+
+
+def _files(
+    info: DatasetInfo, camera: str, channel: capture.Channel, rows: Sequence[Row]
+) -> list[Path]:
+    return [info.media_path(row["shard"], camera, channel, row["index"]) for row in rows]
 
 
 def _read_ids(path: Path) -> NDArray[np.uint16]:

@@ -14,18 +14,17 @@ from numpy.typing import NDArray
 from gen_data.assets.asset_ids import parse_asset_id
 from gen_data.assets.drape import split_draped
 from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.core.lane_geometry import LaneBorder, border_line, lane_borders
 from gen_data.core.scene import Body, Lane, Scene
 from gen_data.core.se3 import Array, Vec3
+from gen_data.exporters import base
 from gen_data.roads.carriageway import PAINT, PAVED, ground_bodies, surface
 
 HOLE_M2 = 1.0
 """Smaller holes are covers of manholes and drains, over which vehicles drive."""
 CRUMB_M2 = 0.01
 """Smaller pieces of areas are rounding."""
-LARGE_M2 = 1.0
-"""Smaller pieces are mostly patches and traces on larger ones, which need not be joined."""
 DECIMALS = 4
 """Corners of meshes are rounded to tenths of millimetres: pieces that meet have no cracks."""
 BESIDE_M, ACROSS_M = 0.45, 0.4
@@ -51,12 +50,30 @@ Geometry = Any
 """Of Shapely, which has no types."""
 
 
-def check_street(scene: Scene, exporter: str) -> None:
-    """Raise ConfigError if a scene has no driving lane."""
-    if not any(lane.kind == "driving" for lane in scene.lanes):
-        raise ConfigError(
-            f"exporter '{exporter}': the scene has no driving lane; add an element 'road'"
-        )
+class StreetExporter(base.AssetExporter):
+    """An exporter of maps, which scenes without a street do not have."""
+
+    type: str
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a system without Shapely.
+
+        Raises:
+            ConfigError: Shapely is missing.
+        """
+        del info
+        base.check_installed(self.type, "shapely")
+
+    def check_scene(self, scene: Scene) -> None:
+        """Reject scenes without a street.
+
+        Raises:
+            ConfigError: the text names the missing element.
+        """
+        if not any(lane.kind == "driving" for lane in scene.lanes):
+            raise ConfigError(
+                f"exporter '{self.type}': the scene has no driving lane; add an element 'road'"
+            )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -105,6 +122,14 @@ class Paint:
     style: Literal["none", "solid", "dashed"] = "none"
     is_double: bool = False
     is_yellow: bool = False
+
+
+PAINTS = tuple(
+    Paint(style, double, yellow)
+    for style in ("none", "dashed", "solid")
+    for double in (False, True)
+    for yellow in (False, True)
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -172,9 +197,8 @@ class RoadMap:
 def road_map(scene: Scene, assets: AssetLibrary) -> RoadMap:
     """Derive the map of a world from its lanes, meshes and signals."""
     lanes = tuple(lane for lane in scene.lanes if len(lane.center_m) > 1)
-    bodies = [_level(body) for body in ground_bodies(scene)]
-    plans = {body.name: _union(surface(body, assets, PAVED)[0]) for body in bodies}
-    paint = _paint(bodies, assets)
+    plans = _plans(scene, assets)
+    paint = find_paint(scene, assets)
     driving = [lane for lane in lanes if lane.kind == "driving"]
     segments = tuple(_segments(driving, plans))
     blocks = tuple(_blocks(driving, segments))
@@ -190,9 +214,16 @@ def road_map(scene: Scene, assets: AssetLibrary) -> RoadMap:
     )
 
 
+def drivable_areas(scene: Scene, assets: AssetLibrary) -> tuple[Area, ...]:
+    """``RoadMap.drivable`` alone."""
+    return tuple(_areas(_join(_plans(scene, assets).values())))
+
+
 def find_paint(scene: Scene, assets: AssetLibrary) -> "PaintIndex":
     """All paint of a street."""
-    return _paint([_level(body) for body in ground_bodies(scene)], assets)
+    marks = [surface(body, assets, PAINT) for body in _level_bodies(scene)]
+    triangles = np.concatenate([np.zeros((0, 3, 2)), *(found[0][..., :2] for found in marks)])
+    return PaintIndex(triangles, np.concatenate([np.zeros(0, np.bool_), *(m[1] for m in marks)]))
 
 
 def lane_area(lanes: Sequence[Lane]) -> Area:
@@ -229,11 +260,12 @@ class PaintIndex:
         import shapely
 
         path = shapely.LineString(line)
-        near = np.sort(self._tree.query(path, predicate="dwithin", distance=BESIDE_M))
+        steps = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
+        near = np.unique(self._tree.query(steps, predicate="dwithin", distance=BESIDE_M)[1])
+        if not len(near):
+            return (PAINTS[0],) * len(line)
         corners = self.triangles[near]
         at_m = shapely.line_locate_point(path, shapely.points(line))
-        if not len(near):
-            return (Paint(),) * len(line)
         along_m = shapely.line_locate_point(path, shapely.points(corners))
         middle_m = np.clip(along_m.mean(axis=1), 0.05, path.length - 0.05)
         before, after = (
@@ -259,14 +291,8 @@ class PaintIndex:
             for flags in (some, some & left & right, some & tinted)
         )
         share = painted / np.maximum(high - low, 1)
-        return tuple(
-            Paint()
-            if part < DASHED
-            else Paint("solid" if part >= SOLID else "dashed", 2 * two > count, 2 * dyed > count)
-            for part, count, two, dyed in zip(
-                share.tolist(), painted.tolist(), double.tolist(), tint.tolist(), strict=True
-            )
-        )
+        kinds = 4 + 4 * (share >= SOLID) + 2 * (2 * double > painted) + (2 * tint > painted)
+        return tuple(PAINTS[kind] for kind in np.where(share < DASHED, 0, kinds).tolist())
 
 
 def _covered(
@@ -275,33 +301,59 @@ def _covered(
     """Which stations are within any chosen span."""
     first = np.searchsorted(stations, spans[0][chosen])
     last = np.searchsorted(stations, spans[1][chosen], "right")
-    steps = np.zeros(len(stations) + 1, np.int64)
-    np.add.at(steps, first, 1)
-    np.add.at(steps, last, -1)
+    count = len(stations) + 1
+    steps = np.bincount(first, minlength=count) - np.bincount(last, minlength=count)
     return np.asarray(np.cumsum(steps)[:-1] > 0)
 
 
-def _paint(bodies: Iterable[Body], assets: AssetLibrary) -> PaintIndex:
-    marks = [surface(body, assets, PAINT) for body in bodies]
-    triangles = np.concatenate([np.zeros((0, 3, 2)), *(found[0][..., :2] for found in marks)])
-    return PaintIndex(triangles, np.concatenate([np.zeros(0, np.bool_), *(m[1] for m in marks)]))
+def _level_bodies(scene: Scene) -> list[Body]:
+    """Bodies of the ground, on level ground: meshes have fewer triangles, and the same plan."""
+    bodies = []
+    for body in ground_bodies(scene):
+        found = split_draped(parse_asset_id(body.asset)) if "relief=" in body.asset else None
+        bodies.append(body if found is None else replace(body, asset=str(found[0])))
+    return bodies
 
 
-def _level(body: Body) -> Body:
-    """A body on level ground: its mesh has fewer triangles, and the same plan."""
-    found = split_draped(parse_asset_id(body.asset)) if "relief=" in body.asset else None
-    return body if found is None else replace(body, asset=str(found[0]))
+def _plans(scene: Scene, assets: AssetLibrary) -> dict[str, Geometry]:
+    """Carriageways by name of the body."""
+    paved = {body.name: surface(body, assets, PAVED)[0] for body in _level_bodies(scene)}
+    return {name: plan_area(triangles) for name, triangles in paved.items() if len(triangles)}
 
 
-def _union(triangles: Array) -> Geometry:
+def plan_area(triangles: Array) -> Geometry:
+    """Area of upward triangles [n, 3, 3] in plan; they may overlap. Small holes are filled.
+
+    Sides of two triangles cancel: the other ones part the plane into few faces, and how often they
+    wind around a face is the number of triangles on it.
+    """
     import shapely
 
-    pieces = shapely.polygons(triangles[..., :2].round(DECIMALS))
-    large = shapely.area(pieces) > LARGE_M2
-    base = shapely.union_all(pieces[large])
-    shapely.prepare(base)
-    small = pieces[~large]
-    return _tidy(shapely.union_all([base, *small[~shapely.covers(base, small)]]))
+    corners = np.rint(triangles[..., :2] * 10.0**DECIMALS).astype(np.int64)
+    keys = (corners[..., 0] << 32) + corners[..., 1]
+    side = np.stack([keys, np.roll(keys, -1, axis=1)], axis=-1).reshape(-1, 2)
+    low, high = side.min(axis=1), side.max(axis=1)
+    order = np.lexsort((high, low))
+    changes = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
+    first = np.flatnonzero(np.concatenate([[True], changes]))
+    times = np.add.reduceat(np.sign(side[:, 1] - side[:, 0])[order], first)
+    rows, times = order[first][times != 0], times[times != 0]
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-2).reshape(-1, 2, 2)[rows]
+    ends = np.where((side[rows, 0] < side[rows, 1])[:, None, None], ends, ends[:, ::-1])
+    lines = ends / 10.0**DECIMALS
+    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(shapely.linestrings(lines))]))
+    inside = shapely.get_coordinates(shapely.point_on_surface(faces))
+    return _tidy(shapely.coverage_union_all(faces[_winding(lines, times, inside) > 0]))
+
+
+def _winding(lines: Array, times: NDArray[np.int64], points: Array) -> NDArray[np.int64]:
+    """How often lines [n, 2, 2], each counted some times [n], wind around points [k, 2]; [k]."""
+    (x0, y0), (x1, y1) = lines[:, 0].T, lines[:, 1].T
+    x, y = points.T[..., None]
+    left = (x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)
+    upward = (y0 <= y) & (y < y1) & (left > 0.0)
+    downward = (y1 <= y) & (y < y0) & (left < 0.0)
+    return np.asarray((upward.astype(np.int64) - downward) @ times)
 
 
 def _join(areas: Iterable[Geometry]) -> Geometry:

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from gen_data.core.capture import Channel, ImageEncoding
 from gen_data.core.interfaces import DatasetInfo, media_path
+from gen_data.core.reported import reported
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import Array
 from gen_data.exporters import base, label_map, label_png, rgbd_sequences, sequences
@@ -81,7 +82,7 @@ class ScanNet(rgbd_sequences.RgbdExporter):
         view = sample.truth[camera].camera
         k = view.intrinsics
         return {
-            "pose": view.T_world_camera.matrix().tolist(),
+            "pose": reported(view).T_world_camera.matrix().tolist(),
             "size_px": [k.width_px, k.height_px],
             "pinhole": rgbd_sequences.opencv_pinhole(k),
         }

@@ -156,10 +156,11 @@ class SemanticKitti(base.ExporterBase):
             stem = folder / f"{sample.index:09d}"
             write_bytes(stem.with_suffix(".bin"), point_cloud_io.xyzi_bytes(points))
             write_bytes(stem.with_suffix(".label"), point_labels(points, sample.scene).tobytes())
+            eye = camera_mount(sample.scene, camera, true=True)
             row = {
                 "scene": sample.scene_index,
-                "time_s": sensor_selection.instant_s(sample, lidar),
-                "T_world_camera": mounted_pose(sample.scene, camera_mount(sample.scene, camera)),
+                "time_s": sensor_selection.stamp_s(sample, lidar),
+                "T_world_camera": mounted_pose(sample.scene, eye),
                 "calib": _calib(sample.scene, camera, lidar),
             }
             rows.append(frame_facts(info, sample) | row)

@@ -1,11 +1,13 @@
 """Selection of the sensors that a format exports."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from gen_data.core.capture import Channel
+from gen_data.core.capture import Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.core.interfaces import DatasetInfo, cloud_path
+from gen_data.core.reported import clock_error_s, delayed_s
 from gen_data.core.sample import Sample
 
 
@@ -89,6 +91,21 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
         )
 
 
+def check_calibrations(info: DatasetInfo, cameras: Collection[str], exporter: str) -> None:
+    """Reject errors of calibrations in a format whose cameras are parallel by definition.
+
+    Raises:
+        ConfigError: one of several cameras has the fault ``extrinsics``.
+    """
+    wrong = [name for name in cameras if "extrinsics" in info.sensor(name).faults]
+    if wrong and len(cameras) > 1:
+        raise ConfigError(
+            f"exporter '{exporter}': sensor '{wrong[0]}': faults.extrinsics: the format's images "
+            "are rectified and its cameras parallel; remove the fault, export one camera, or use "
+            "another format, such as nuscenes or calibration"
+        )
+
+
 def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
     """Find a camera as ``rgb_camera`` does, for formats that describe pinholes only.
 
@@ -126,6 +143,33 @@ def instant_s(sample: Sample, sensor: str) -> float:
         if seen is not None:
             return seen.time_s
     return sample.scene.time_s
+
+
+def stamp_s(sample: Sample, sensor: str) -> float:
+    """Reported time of a sensor's reading [s], which formats state.
+
+    It is ``instant_s``, to which labels refer, unless the sensor's clock is wrong.
+    """
+    return delayed_s(instant_s(sample, sensor), stamp_error_s(sample, sensor))
+
+
+def times(sample: Sample, sensor: str) -> dict[str, float]:
+    """``time_s``, the true instant of a reading, and ``stamp_s``, if its clock is wrong."""
+    time_s, stamp = instant_s(sample, sensor), stamp_s(sample, sensor)
+    return {"time_s": time_s} if stamp == time_s else {"time_s": time_s, "stamp_s": stamp}
+
+
+def row_stamp_s(row: Mapping[str, Any]) -> float:
+    """Reported time in a row with the items of ``times``."""
+    return float(row.get("stamp_s", row["time_s"]))
+
+
+def stamp_error_s(sample: Sample, sensor: str) -> float:
+    """Reported minus true instant of a sensor's reading [s]; 0 if it did not read."""
+    capture = sample.capture
+    kinds: tuple[Mapping[str, SensorReading | PointCloud | Measurements], ...]
+    kinds = (capture.readings, capture.clouds, capture.tables)
+    return next((clock_error_s(kind[sensor]) for kind in kinds if sensor in kind), 0.0)
 
 
 def _join_names(names: Sequence[str]) -> str:

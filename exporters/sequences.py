@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gen_data.core import errors, interfaces, scene_time, se3
+from gen_data.core.reported import reported
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.core.serialization import canonical_json
@@ -160,23 +161,26 @@ class Mount:
     T_rig_sensor: se3.SE3
 
 
-def camera_mount(scene: Scene, name: str) -> Mount:
-    """Mount of a camera; a camera without a rig is its own rig, along its optical axis."""
+def camera_mount(scene: Scene, name: str, *, true: bool = False) -> Mount:
+    """Mount of a camera; a camera without a rig is its own rig, along its optical axis.
+
+    Mounts are as calibrations state them, or ``true``: without the errors of calibrations.
+    """
     camera = scene.camera(name)
-    if camera.rig:
-        return Mount(camera.rig, camera.T_rig_camera)
-    return Mount(f"/{name}", scene_time.RIG_AXES.inverse())
+    pose = camera.T_rig_camera if camera.rig else scene_time.RIG_AXES.inverse()
+    error = None if true else camera.T_sensor_reported
+    return Mount(camera.rig or f"/{name}", pose if error is None else pose @ error)
 
 
-def lidar_mount(scene: Scene, name: str) -> Mount:
+def lidar_mount(scene: Scene, name: str, *, true: bool = False) -> Mount:
     """Mount of a laser scanner."""
-    lidar = scene.lidar(name)
+    lidar = scene.lidar(name) if true else reported(scene.lidar(name))
     return _carried_mount(scene, lidar.rig, lidar.camera, lidar.T_rig_lidar)
 
 
 def device_mount(scene: Scene, name: str) -> Mount:
     """Mount of a device."""
-    device = scene.device(name)
+    device = reported(scene.device(name))
     return _carried_mount(scene, device.rig, device.camera, device.T_rig_device)
 
 
@@ -184,7 +188,7 @@ def _carried_mount(scene: Scene, rig: str, camera: str, T_rig_sensor: se3.SE3) -
     """Mount of a sensor on a rig; on its camera if it has none."""
     if rig:
         return Mount(rig, T_rig_sensor)
-    carrier = camera_mount(scene, camera)
+    carrier = camera_mount(scene, camera, true=True)
     return Mount(carrier.rig, carrier.T_rig_sensor @ scene_time.RIG_AXES @ T_rig_sensor)
 
 

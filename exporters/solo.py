@@ -35,6 +35,7 @@ from gen_data.core import errors, intrinsics
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.motion import STILL, Twist
+from gen_data.core.reported import reported
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Camera, Scene
 from gen_data.core.scene_time import rig_twist
@@ -42,7 +43,7 @@ from gen_data.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
 from gen_data.exporters import base, fragments, image_files, label_png
 from gen_data.exporters.conventions import EDGES, PINHOLE, READING, Conventions
 from gen_data.exporters.id_colors import id_color, id_colors
-from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_camera, rgb_cameras
+from gen_data.exporters.sensor_selection import check_pinholes, rgb_camera, rgb_cameras, stamp_s
 from gen_data.exporters.sequences import frame_facts, write_bytes, write_json
 
 FORMAT_VERSION = "1.0.0-preview.1"
@@ -117,7 +118,7 @@ class Solo(base.ExporterBase):
                 _write_segmentation(folder, sample, name)
             if cameras:
                 captures = [_capture(info, sample, name) for name in cameras]
-                time_s = round(instant_s(sample, cameras[0]), 9)
+                time_s = round(stamp_s(sample, cameras[0]), 9)
                 rows.append({**frame_facts(info, sample), "time_s": time_s, "captures": captures})
         fragments.write_fragment(folder, FRAMES, rows)
 
@@ -171,7 +172,7 @@ class _Counter:
 def _capture(info: DatasetInfo, sample: Sample, name: str) -> dict[str, Any]:
     truth = sample.truth[name]
     camera = truth.camera
-    T_world_camera = camera.T_world_camera
+    T_world_camera = reported(camera).T_world_camera
     rotation = UNITY_WORLD @ T_world_camera.rotation() @ UNITY_SENSOR
     twist = _camera_twist(sample.scene_of(name), camera)
     seen = [thing for thing in truth.objects if thing.box is not None and not thing.ignored]
@@ -192,7 +193,7 @@ def _capture(info: DatasetInfo, sample: Sample, name: str) -> dict[str, Any]:
             {**_head(BOX2D, name), "values": [_box2d(thing) for thing in seen]},
             {
                 **_head(BOX3D, name),
-                "values": [_box3d(t, T_world_camera) for t in seen if _is_ahead(t)],
+                "values": [_box3d(t, camera.T_world_camera) for t in seen if _is_ahead(t)],
             },
             {
                 **_head(INSTANCES, name),

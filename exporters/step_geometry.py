@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gen_data.core import demonstrations, se3
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import reported
 from gen_data.core.sample import Predicate, Sample
 from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.sensor_selection import require_channels
@@ -100,7 +101,8 @@ def step_values(
     for camera in cameras if "calibration" in parts else ():
         seen = sample.truth[camera].camera
         values[f"annotation.K.{camera}"] = seen.intrinsics.matrix().tolist()
-        values[f"annotation.T_world_camera.{camera}"] = seen.T_world_camera.matrix().tolist()
+        pose = reported(seen).T_world_camera
+        values[f"annotation.T_world_camera.{camera}"] = pose.matrix().tolist()
         if seen.intrinsics.lens.coefficients:
             values[f"annotation.distortion.{camera}"] = list(seen.intrinsics.lens.coefficients)
     return values

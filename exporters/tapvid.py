@@ -21,6 +21,7 @@ the readers in google-deepmind/tapnet.
 
 import pickle
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -32,6 +33,7 @@ from pydantic import Field
 
 from gen_data.core.capture import Channel, ImageEncoding
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.reported import reported
 from gen_data.core.sample import TRACK_STATES, Sample, SensorTracks
 from gen_data.core.scene import Camera
 from gen_data.exporters import base, image_files, sensor_selection
@@ -51,6 +53,23 @@ LEVEL = 1
 """Of compression; higher ones save little."""
 PICKLE = 4
 VISIBLE, GLASS = TRACK_STATES.index("visible"), TRACK_STATES.index("glass")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Clip:
+    """A sequence of one camera: its name, frames, and arrays of its tracks, frames first."""
+
+    info: DatasetInfo
+    camera: str
+    name: str
+    frames: Sequence[Frame]
+    tracks: dict[str, NDArray[Any]]
+
+    def path(self, frame: Frame) -> Path:
+        return self.info.media_path(frame.shard_dir, self.camera, Channel.RGB, frame.index)
+
+    def photograph(self, frame: Frame) -> NDArray[np.uint8]:
+        return image_files.read_image(self.path(frame), Channel.RGB, self.info.depth_scale_m)
 
 
 class TapVid(base.ExporterBase):
@@ -109,13 +128,13 @@ class TapVid(base.ExporterBase):
             "image_px": np.nan_to_num(tracks.image_px, nan=0.0),
             "visible": seen,
             "K": np.array([k.fx_px, k.fy_px, k.cx_px, k.cy_px]),
-            "T_camera_world": camera.T_world_camera.inverse().matrix(),
+            "T_camera_world": reported(camera).T_world_camera.inverse().matrix(),
         }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write a file for every sequence and camera; a frame that is missing ends a sequence."""
         dataset_dir.mkdir(parents=True, exist_ok=True)
-        makers: dict[Layout, tuple[str, Callable[..., bytes]]] = {
+        makers: dict[Layout, tuple[str, Callable[[_Clip], bytes]]] = {
             "tapvid": ("pkl", self._video),
             "tapvid3d": ("npz", self._scene_tracks),
         }
@@ -134,34 +153,20 @@ class TapVid(base.ExporterBase):
                 for layout in self.layouts:
                     ending, make = makers[layout]
                     path = dataset_dir / layout / frames[0].row["split"] / f"{name}.{ending}"
-                    write_bytes(path, make(info, camera, name, frames, stacked))
+                    write_bytes(path, make(_Clip(info, camera, name, frames, stacked)))
 
-    def _video(
-        self,
-        info: DatasetInfo,
-        camera: str,
-        name: str,
-        frames: Sequence[Frame],
-        tracks: dict[str, NDArray[Any]],
-    ) -> bytes:
-        images = np.stack([_photograph(info, camera, frame) for frame in frames])
-        points = tracks["image_px"].transpose(1, 0, 2) / images.shape[2:0:-1]
-        clip = {
+    def _video(self, clip: _Clip) -> bytes:
+        images = np.stack([clip.photograph(frame) for frame in clip.frames])
+        points = clip.tracks["image_px"].transpose(1, 0, 2) / images.shape[2:0:-1]
+        arrays = {
             "video": images,
             "points": points.astype(np.float32),
-            "occluded": ~tracks["visible"].T,
+            "occluded": ~clip.tracks["visible"].T,
         }
-        return pickled({name: clip})
+        return pickled({clip.name: arrays})
 
-    def _scene_tracks(
-        self,
-        info: DatasetInfo,
-        camera: str,
-        name: str,
-        frames: Sequence[Frame],
-        tracks: dict[str, NDArray[Any]],
-    ) -> bytes:
-        del name
+    def _scene_tracks(self, clip: _Clip) -> bytes:
+        tracks = clip.tracks
         first = tracks["visible"].argmax(axis=0)
         places_px = tracks["image_px"][first, np.arange(len(first))]
         arrays = {
@@ -170,16 +175,16 @@ class TapVid(base.ExporterBase):
             "fx_fy_cx_cy": tracks["K"][0],
             "queries_xyt": np.column_stack([places_px, first]).astype(np.float32),
             # Fixed lengths, which need no pickle: zeros at the end are dropped, JPEG ends with D9.
-            "images_jpeg_bytes": np.array([self._jpeg(info, camera, f) for f in frames]),
+            "images_jpeg_bytes": np.array([self._jpeg(clip, frame) for frame in clip.frames]),
             "extrinsics_w2c": tracks["T_camera_world"],
         }
         return npz_bytes(arrays, LEVEL)
 
-    def _jpeg(self, info: DatasetInfo, camera: str, frame: Frame) -> bytes:
-        if info.encoding(camera, Channel.RGB).format == "jpeg":
-            return info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index).read_bytes()
-        image, encoding = _photograph(info, camera, frame), ImageEncoding("jpeg", self.jpeg_quality)
-        return image_files.encode_channel(Channel.RGB, image, info.depth_scale_m, encoding)
+    def _jpeg(self, clip: _Clip, frame: Frame) -> bytes:
+        if clip.info.encoding(clip.camera, Channel.RGB).format == "jpeg":
+            return clip.path(frame).read_bytes()
+        image, encoding = clip.photograph(frame), ImageEncoding("jpeg", self.jpeg_quality)
+        return image_files.encode_channel(Channel.RGB, image, clip.info.depth_scale_m, encoding)
 
 
 class _Arrays(pickle.Pickler):
@@ -213,8 +218,3 @@ def _videos(
 
 def _fragment(folder: Path, camera: str, index: int) -> Path:
     return folder / f"{index:09d}.{camera}.npz"
-
-
-def _photograph(info: DatasetInfo, camera: str, frame: Frame) -> NDArray[np.uint8]:
-    path = info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
-    return image_files.read_image(path, Channel.RGB, info.depth_scale_m)

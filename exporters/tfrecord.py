@@ -44,6 +44,7 @@ from pydantic import Field
 from gen_data.core import capture, serialization
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.lens import Lens
+from gen_data.core.reported import reported
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.exporters import base, ignored_regions, png, sensor_selection, sequences
 from gen_data.exporters.conventions import Conventions
@@ -175,7 +176,7 @@ def _image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, F
         "image/scene": [sample.scene_index],
         **_lens_labels(camera.intrinsics.lens),
         "image/intrinsics": camera.intrinsics.matrix().ravel().tolist(),
-        "image/T_world_camera": camera.T_world_camera.matrix().ravel().tolist(),
+        "image/T_world_camera": reported(camera).T_world_camera.matrix().ravel().tolist(),
         "image/conventions": [serialization.canonical_json(TfRecord.conventions.facts()).encode()],
     }
 

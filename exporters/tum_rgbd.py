@@ -13,6 +13,7 @@ Folders are sequences. Timestamps are seconds from the start of the sequence's s
 the colour camera's optical centre in the world (X right, Y down, Z forward). Depth is
 z-depth, registered to the colour image; surfaces beyond 13.1 m have none. The principal point has
 pixel centres at whole numbers. Accelerations [m/s^2] are specific forces along the IMU's axes.
+With a wrong clock, images have reported times, and the trajectory has true ones.
 
 Reference: Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012, and the
 benchmark's page on file formats; DROID-SLAM and DPVO read ``calibration.txt``.
@@ -64,7 +65,7 @@ class TumRgbd(rgbd_sequences.RgbdExporter):
         view = sample.truth[camera].camera
         w, *xyz = view.T_world_camera.quaternion_wxyz
         return {
-            "time_s": sensor_selection.instant_s(sample, camera),
+            **sensor_selection.times(sample, camera),
             "pose": [*view.T_world_camera.translation_m, *xyz, w],
             "calibration": rgbd_sequences.opencv_pinhole(view.intrinsics),
         }
@@ -76,7 +77,7 @@ class TumRgbd(rgbd_sequences.RgbdExporter):
         for number, frames in read_sequences(shard_dirs, self.type).items():
             folder = folders[number] = dataset_dir / frames[0].row["split"] / f"{number:06d}"
             for frame in frames:
-                name = f"{_time(frame.row['time_s'])}.png"
+                name = f"{_time(sensor_selection.row_stamp_s(frame.row))}.png"
                 rgb = media_path(frame.shard_dir, camera, capture.Channel.RGB, frame.index)
                 image_files.link_or_copy(rgb, folder / "rgb" / name)
                 depth = frame.shard_dir / self.type / f"{frame.index:09d}.png"
@@ -102,9 +103,10 @@ class TumRgbd(rgbd_sequences.RgbdExporter):
 def sequence_texts(frames: Sequence[Frame]) -> Mapping[str, str]:
     """Text files of one sequence, by name."""
     rows: list[Mapping[str, Any]] = [frame.row for frame in frames]
+    stamps = [_time(sensor_selection.row_stamp_s(row)) for row in rows]
     texts = {
         f"{kind}.txt": f"# {title}\n# file: {kind}\n# timestamp filename\n"
-        + "".join(f"{_time(row['time_s'])} {kind}/{_time(row['time_s'])}.png\n" for row in rows)
+        + "".join(f"{stamp} {kind}/{stamp}.png\n" for stamp in stamps)
         for kind, title in (("rgb", "color images"), ("depth", "depth maps"))
     }
     head = "# ground truth trajectory\n# file: groundtruth\n# timestamp tx ty tz qx qy qz qw\n"

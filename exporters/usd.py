@@ -48,6 +48,7 @@ class Usd(base.AssetExporter):
     """
 
     type: Literal["usd"] = "usd"
+    shows_truth: ClassVar[bool] = True
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i + 0.5",
         lens="any; `genData:lens:*`",

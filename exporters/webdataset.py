@@ -38,8 +38,9 @@ from pydantic import Field
 
 from gen_data.core import errors, serialization
 from gen_data.core.interfaces import DatasetInfo, cloud_path, origins_path, table_path
+from gen_data.core.reported import reported, reported_s
 from gen_data.core.sample import Sample
-from gen_data.exporters import base, coco, fragments, point_cloud_io, sensor_selection, sequences
+from gen_data.exporters import base, coco, fragments, sensor_selection, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
 
 SAMPLES = "samples"
@@ -119,10 +120,8 @@ def sample_labels(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         "cameras": {name: coco.image_labels(info, sample, name) for name in sorted(sample.truth)},
         "lidars": {
             name: {
-                "time_s": cloud.time_s,
-                "T_world_lidar": point_cloud_io.scanner_at_sweep(sample, name)
-                .T_world_lidar.matrix()
-                .tolist(),
+                "time_s": reported_s(cloud),
+                "T_world_lidar": reported(cloud.lidar).T_world_lidar.matrix().tolist(),
             }
             for name, cloud in sorted(sample.capture.clouds.items())
         },

@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from gen_data.core import errors, streams
+from gen_data.core.bounded_cache import ObjectCache
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import ObjectGroup, Scene
 from gen_data.core.streams import pick_by_weight
@@ -12,6 +13,9 @@ from gen_data.randomizers.base import RandomizerBase, check_known, choose
 
 CategoryWeights = tuple[tuple[float, tuple[str, ...]], ...]
 """Weight and asset ids of every category with a weight above 0."""
+_GROUPS = 256
+_members: ObjectCache[ObjectCache[dict[str, tuple[str, ...]]]] = ObjectCache(1)
+"""Ids of the latest groups by category, of the latest library: most scenes have the same groups."""
 
 
 class GroupRandomizer(RandomizerBase):
@@ -38,18 +42,25 @@ class GroupRandomizer(RandomizerBase):
         field, name = f"randomizers.{self.name}", self.group or self.name
         groups = {group.name: group for group in scene.groups}
         check_known(name, groups, f"{field}.group: the template has no object group")
-        members: dict[str, list[str]] = {}
-        for asset_id in groups[name].assets:
-            members.setdefault(assets.get(asset_id).category, []).append(asset_id)
+        listed = groups[name].assets
+        known = _members.get(assets, lambda: ObjectCache(_GROUPS))
+        members = known.get(listed, lambda: _by_category(listed, assets))
         if not members:
             return groups[name], ()
         for category in self.weights:
             check_known(category, sorted(members), f"{field}.weights: the group has no category")
-        weighted = ((self.weights.get(key, 1.0), tuple(members[key])) for key in sorted(members))
+        weighted = ((self.weights.get(key, 1.0), members[key]) for key in sorted(members))
         kept = tuple((weight, ids) for weight, ids in weighted if weight > 0.0)
         if not kept:
             raise errors.ConfigError(f"{field}.weights: every weight is 0; expected one above 0")
         return groups[name], kept
+
+
+def _by_category(asset_ids: tuple[str, ...], assets: AssetIndex) -> dict[str, tuple[str, ...]]:
+    members: dict[str, list[str]] = {}
+    for asset_id in asset_ids:
+        members.setdefault(assets.get(asset_id).category, []).append(asset_id)
+    return {category: tuple(ids) for category, ids in members.items()}
 
 
 def draw_kinds(weights: CategoryWeights, count: int, rng: streams.Rng) -> CategoryWeights:

@@ -16,7 +16,8 @@ Sensor = TypeVar("Sensor", Camera, Lidar, Device)
 class RigCalibration(RandomizerBase):
     """Perturbs the pose of sensors on their rigs, as no two vehicles are built alike.
 
-    Labels and calibration files contain the perturbed poses.
+    Labels and calibration files contain the perturbed poses. A calibration that states another pose
+    than the true one is the fault ``extrinsics`` of a sensor.
 
     Attributes:
         rig: Name of a rig; empty = every rig.

@@ -12,6 +12,7 @@ from gen_data.config.data_files import load_table
 from gen_data.core.asset_types import Material
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
 from gen_data.randomizers.base import SurfaceRandomizer, body_materials
 from gen_data.randomizers.color_space import hsv_to_linear
@@ -152,19 +153,22 @@ class VehiclePaint(SurfaceRandomizer):
 
 def _finish(body: Body, assets: AssetIndex, paint: dict[str, Any] | None, dirt: float) -> Body:
     """Return the body with dust on it, and painted unless the paint is None."""
+    is_soiled, cleaned, soiled, dust = (
+        declared(_DIRT, fact) for fact in ("is_soiled", "cleaned", "soiled", "dust")
+    )
 
     def finish(material: Material) -> Material:
-        gathers, seed = declared(_DIRT, "is_soiled")(material), 0
+        gathers, seed = is_soiled(material), 0
         if gathers:
-            material, seed = declared(_DIRT, "cleaned")(material)
+            material, seed = cleaned(material)
         if paint is not None and material.role == PAINT and not material.printed:
             material = replace(material, **paint)
         if material.role in _SOILED:
-            material = _soil(material, dirt)
+            material = _soil(material, dirt, dust)
         if not gathers or dirt <= 0.0:
             return material
-        soiled: Material = declared(_DIRT, "soiled")(material, _GATHERED * dirt, seed)
-        return soiled
+        dirty: Material = soiled(material, _GATHERED * dirt, seed)
+        return dirty
 
     slots = body_materials(body, assets)
     return replace(body, materials=tuple(finish(material) for material in slots))
@@ -178,15 +182,16 @@ def _pick(weights: Mapping[str, float], rng: Rng) -> str:
     return next(n for n, end in zip(names, ends, strict=True) if draw < end)
 
 
-def _soil(material: Material, dirt: float) -> Material:
+def _soil(material: Material, dirt: float, dust: Vec3) -> Material:
     """Return the material under a thin layer of dust: blended with its colour, and rougher."""
     share = min(_SOILED[material.role] * dirt, 1.0)
     red, green, blue = (
-        round(clean * (1.0 - share) + dust * share, 6)
-        for clean, dust in zip(material.base_color, declared(_DIRT, "dust"), strict=True)
+        round(clean * (1.0 - share) + dusty * share, 6)
+        for clean, dusty in zip(material.base_color, dust, strict=True)
     )
-    rough = round(material.roughness + (0.8 - material.roughness) * share, 4)
-    dusty = replace(material, base_color=(red, green, blue), roughness=rough)
-    if not material.coat:
-        return dusty
-    return replace(dusty, coat=round(material.coat * (1.0 - share), 6))
+    return replace(
+        material,
+        base_color=(red, green, blue),
+        roughness=round(material.roughness + (0.8 - material.roughness) * share, 4),
+        coat=round(material.coat * (1.0 - share), 6),
+    )

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from gen_data.config.base_model import Strict
 from gen_data.core import errors
 from gen_data.core.asset_types import Asset
+from gen_data.core.bounded_cache import CountCache, ObjectCache
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members
 from gen_data.core.scene import ObjectGroup, Placement, Scene, SupportSurface
@@ -28,6 +29,9 @@ _GAPS_M = (0.24, 0.18, 0.12, 0.08, 0.05, 0.03, 0.015, 0.005)
 _STEP_M = 0.02
 _TURNS_MAX = 100_000
 """Limit on the steps, rows and layers tried for one object; large surfaces need fewer."""
+_CHOICES = 256
+_resolved: ObjectCache[CountCache[tuple[str, ...]]] = ObjectCache(1)
+"""Ids of the latest choices, of the latest library: most scenes have the same choices."""
 
 
 class AssetChoice(Strict):
@@ -61,6 +65,13 @@ class AssetChoice(Strict):
             ConfigError: no asset matches.
             AssetError: an id is unknown.
         """
+        known = _resolved.get(assets, lambda: CountCache(_CHOICES))
+        kept = known.get(repr(self), lambda: self._resolve(assets))
+        if not kept:
+            raise errors.ConfigError(f"{field}: no asset matches; expected other tags or ids")
+        return kept
+
+    def _resolve(self, assets: AssetIndex) -> tuple[str, ...]:
         found = {a.asset_id: a for a in assets.find(self.tags)} if self.tags else {}
         for tag in self.any_of:
             found |= {a.asset_id: a for a in assets.find((tag,))}
@@ -68,10 +79,7 @@ class AssetChoice(Strict):
             members = assets.variants(asset_id) or (assets.get(asset_id),)
             found |= {a.asset_id: a for a in members}
         fitting = [asset for asset in found.values() if not _words(asset) & set(self.exclude)]
-        kept = sorted(asset.asset_id for asset in self._select_preferred(fitting))
-        if not kept:
-            raise errors.ConfigError(f"{field}: no asset matches; expected other tags or ids")
-        return tuple(kept)
+        return tuple(sorted(asset.asset_id for asset in self._select_preferred(fitting)))
 
     def _select_preferred(self, fitting: list[Asset]) -> Iterator[Asset]:
         by_category: dict[str, list[Asset]] = {}

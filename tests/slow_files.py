@@ -1,8 +1,8 @@
 """Files with slow tests that CI runs for a commit: ``python -m tests.slow_files``.
 
-All slow tests together take longer than CI has. It runs a quarter of their files, which the commit
-decides, and all that changed within six hours of it: those of the same piece of work. So a file
-runs with each change of it, and else in every fourth run. ``python -m pytest -m slow`` runs all.
+All slow tests together take longer than CI has. It runs a fifth of their files, which the commit
+decides, and all that changed within three hours of it: those of the same piece of work. So a file
+runs with each change of it, and else in every fifth run. ``python -m pytest -m slow`` runs all.
 """
 
 import re
@@ -13,9 +13,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 MARKED = re.compile(r"mark\.slow|tests\.tiers|needs_open3d")
-SHARE = 4
+SHARE = 5
 """One file of so many runs although it did not change."""
-RECENT_S = 6 * 3600
+RECENT_S = 3 * 3600
 
 
 def marked_files(folder: Path) -> list[str]:

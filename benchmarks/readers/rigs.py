@@ -205,3 +205,35 @@ def by_usd_core(root: Path) -> Iterator[View]:
             pose = np.array(camera.transform).T @ np.diag([1.0, -1.0, -1.0, 1.0])
             name = image_name(int(path.stem), prim.GetName())
             yield View(name, (thing("pose", pose[:3]),), lens)
+
+
+def by_av2(root: Path) -> Iterator[View]:
+    """Argoverse 2: boxes in the city, and lenses of the cameras."""
+    from av2.geometry.camera.pinhole_camera import PinholeCamera
+    from av2.structures.cuboid import CuboidList
+    from av2.utils.io import read_city_SE3_ego
+
+    (log,) = root.glob("*/*")
+    cuboids = CuboidList.from_feather(log / "annotations.feather")
+    egos = read_city_SE3_ego(log)
+    for k, path in enumerate(sorted((log / "sensors/lidar").glob("*.feather"))):
+        here = [c for c in cuboids.cuboids if c.timestamp_ns == int(path.stem)]
+        things = []
+        for one in here:
+            box = one.transform(egos[int(path.stem)])
+            axes = box.dst_SE3_object.rotation.T * box.dims_lwh_m[:, None] / 2
+            things.append(thing(one.category, np.vstack([box.xyz_center_m, axes])))
+        yield View(image_name(k, "world"), tuple(things))
+        for folder in sorted((log / "sensors/cameras").iterdir()):
+            K = PinholeCamera.from_feather(log, folder.name).intrinsics.K
+            yield View(image_name(k, folder.name), (), matrix_lens(K, shift=0.5))
+
+
+def by_av2_points(root: Path) -> Iterator[View]:
+    """Argoverse 2: points of each sweep, back in the scanner's frame."""
+    from av2.structures.sweep import Sweep
+
+    for k, path in enumerate(sorted(root.glob("*/*/sensors/lidar/*.feather"))):
+        sweep = Sweep.from_feather(path)
+        points = sweep.ego_SE3_up_lidar.inverse().transform_point_cloud(sweep.xyz)
+        yield View(image_name(k, "velodyne"), (Thing("points", points.ravel()),))

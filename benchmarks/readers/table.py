@@ -13,6 +13,7 @@ from benchmarks.readers.truth import (
     Cubes,
     Images,
     birdseye,
+    city_cubes,
     grasps,
     grey_depth,
     joints,
@@ -178,6 +179,10 @@ READERS: tuple[Reader, ...] = (
     Reader("nuscenes-devkit", "nuscenes", rigs.by_nuscenes_devkit,
            Cubes(("image_02", "image_03"), category_of), "rig", "m", 1e-5, lens=1e-9,
            is_partial=True, because="micrometres; objects that a sensor senses"),
+    Reader("av2", "argoverse2", rigs.by_av2_points, scans, "rig", "m", 1e-5,
+           because="32-bit floats in the frame of the ego"),
+    Reader("av2", "argoverse2", rigs.by_av2, city_cubes, "rig", "m", 1e-5, lens=1e-9,
+           is_partial=True, because="micrometres; classes of Argoverse"),
     Reader("torchvision", "kitti", rigs.by_torchvision_kitti,
            Cubes(LEFT, official_type, upright=True), "rig", "m", 1e-5, is_partial=True,
            because="micrometres; upright boxes; DontCare is left out"),
@@ -225,11 +230,11 @@ READERS: tuple[Reader, ...] = (
 )  # fmt: skip
 
 WITHOUT_READER = {
-    "argoverse2": "av2 requires torch and kornia; docs/maps.md has the command",
-    "culane": "its evaluation is a program in C++, in no registry",
-    "lidar_flow": "av2 requires torch and kornia; FlowNet3D is in no registry",
-    "map_vectors": "MapTR is in no registry",
+    "culane": "its evaluation is in no registry: benchmarks.readers.evaluations",
+    "lidar_flow": "judged by av2 in benchmarks.readers.evaluations; FlowNet3D is in no registry",
+    "map_vectors": "its evaluation is in no registry: benchmarks.readers.evaluations",
     "opendrive": "our reader; ASAM's checker requires packages of its own (docs/maps.md)",
-    "openlane": "its evaluation is in no registry",
+    "openlane": "its evaluation is in no registry: benchmarks.readers.evaluations",
+    "scene_text": "its evaluations are in no registry: benchmarks.readers.evaluations",
 }
 """Formats without a row, with the reason; tests/exporters compares them with their formulas."""

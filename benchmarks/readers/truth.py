@@ -16,7 +16,8 @@ from gen_data.api.sample import CameraReading
 from gen_data.core.sample import TRACK_STATES, MaskPx, Predicate, SensorTracks
 from gen_data.core.scene import Instance, Scene
 from gen_data.core.se3 import SE3
-from gen_data.exporters import motchallenge
+from gen_data.exporters import argoverse2, motchallenge
+from gen_data.exporters.nuscenes_classes import category_of
 
 DEPTH_UNIT_M = 0.0001
 """Of 16-bit depth images, the default of ``DatasetInfo``."""
@@ -126,6 +127,12 @@ class Cubes:
                 if self.upright:
                     listed = list(map(upright_around, listed))
                 yield View(image_name(sample.index, name), tuple(listed), inner)
+
+
+def city_cubes(folder: Path) -> Iterator[View]:
+    """Boxes in the world with the classes of Argoverse 2, and the lenses of all cameras."""
+    classes = Cubes((), lambda one: argoverse2.CLASSES.get(category_of(one), ""))
+    return chain(classes(folder), Images()(folder))
 
 
 def upright_around(box: Thing) -> Thing:

@@ -57,6 +57,9 @@ def whiteboard_notes(rng: VariantRng) -> TextureData:
 
     def write(x: float, y: float, wide: float, high: float, ink: art.Color) -> None:
         # Letters are loops of a pen that moves on; words end where it lifts.
+        reach = 0.12 * high, 0.35 * high + 1.5
+        ink_px = (x - reach[0], y - reach[1], x + wide + reach[0], y + reach[1])
+        art.note(image, "", [ink_px], 3.0)
         while wide > 0.0:
             word = min(wide, rng.between(2.0, 5.5) * high)
             t = np.linspace(0.0, 1.0, max(6, int(word / high * 9)))

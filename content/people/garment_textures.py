@@ -298,6 +298,8 @@ def _print(albedo: Float32, middle_m: float, ink: Float32, rng: VariantRng) -> F
         artwork.text(stamp, (0.0, 0.05, 1.0, 0.95), rng.choose(_INKS["words"]), (255,) * 3, 3)
     cover = np.array(stamp.resize((w, h)), np.float32)[..., 0] / 255.0
     x0, y0 = int(middle_m * _PX_PER_M - 0.5 * w), int(top_m * _PX_PER_M)
+    tall, wide = albedo.shape[:2]
+    artwork.record(stamp, (x0 / wide, y0 / tall, (x0 + w) / wide, (y0 + h) / tall))
     printed: Float32 = albedo.copy()
     field = printed[y0 : y0 + h, x0 : x0 + w]
     printed[y0 : y0 + h, x0 : x0 + w] = mix_colors(field, ink, cover)

@@ -20,6 +20,7 @@ from gen_data.content.procedural import collision_hulls
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_solid_in_place
 from gen_data.core.asset_types import Keypoint, Material
 from gen_data.core.variant_rng import variant_rng
+from gen_data.core.writing import NO_LANGUAGE, Writing
 
 DICTIONARIES = {
     "apriltag_36h11": "DICT_APRILTAG_36H11", "aruco_4x4_50": "DICT_4X4_50",
@@ -93,6 +94,15 @@ def qr_code(seed: int) -> Solid:
 def qr_code_facts(seed: int) -> Facts:
     """Text, and side without the quiet zone."""
     return Facts(attributes=_draw_code(seed).facts)
+
+
+def qr_code_writing(seed: int) -> tuple[Writing, ...]:
+    """The code's text, and its corners without the quiet zone."""
+    code = _draw_code(seed)
+    quad = [(x, y, 0.5 * PLATE_M) for _, (x, y) in code.corners]
+    # Columns of the quiet zone are one cell each at both sides.
+    module = 1.0 / (len(code.x_m) - 3)
+    return (Writing(code.facts["text"], NO_LANGUAGE, np.array([quad]), module, "code"),)
 
 
 def _draw_marker(seed: int) -> Print:

@@ -15,6 +15,7 @@ def _surface(path: str, **parameters: object) -> Family:
     facts: dict[str, object] = {"draped": "land" if name == "ground" else "layers"}
     if name == "road_marking":
         facts["letters"] = Lazy(f"{__name__}.painted_signs:LETTERS")
+        facts["writing"] = Lazy(f"{__name__}.road_marking:road_marking_writing")
     return Family(name, name, ("street",), 0, 0.0, False, 2, parameters, build, declares=facts)
 
 

@@ -75,8 +75,8 @@ def _turning(start_m: float, side: float) -> Iterator[Array]:
     yield _wind(head * np.array([1.0, side]))
 
 
-def word_polygons(text: str, width_m: float) -> list[Array]:
-    """Polygons of a word as wide as the lane allows, read by drivers from its foot.
+def letter_polygons(text: str, width_m: float) -> list[list[Array]]:
+    """Polygons of each letter of a word as wide as the lane allows, read by drivers from its foot.
 
     Args:
         text: Letters and digits.
@@ -92,11 +92,13 @@ def word_polygons(text: str, width_m: float) -> list[Array]:
     thick = min(0.13, 0.9 * cell)
     made = []
     for k, letter in enumerate(text):
+        strokes = []
         right = (0.5 * (len(text) - 1) - k) * pitch
         for stroke in _STROKES[letter].split():
             (c0, r0), (c1, r1) = ((int(end[0]), int(end[1])) for end in stroke.split("-"))
             ends = ((r0 * row, right + (2 - c0) * cell), (r1 * row, right + (2 - c1) * cell))
-            made.append(_letter_stroke(ends[0], ends[1], thick))
+            strokes.append(_letter_stroke(ends[0], ends[1], thick))
+        made.append(strokes)
     return made
 
 

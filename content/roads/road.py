@@ -356,15 +356,16 @@ def _guard_rail(
 def _hulls(deck: Deck, profile: RoadShape) -> list[Array]:
     """Collision slabs of at most 20 m under every strip."""
     stations = np.linspace(0.0, profile.length_m, max(2, int(np.ceil(profile.length_m / 20.0)) + 1))
+    rows = {
+        side: [strip for strip in strips(profile, side) if strip.kind != "kerb"] for side in (1, -1)
+    }
     hulls = []
     for s0, s1 in pairwise(stations):
-        for side in (1, -1):
-            row = [strip for strip in strips(profile, side) if strip.kind != "kerb"]
+        for side, row in rows.items():
             for strip in row:
-                s, t = np.meshgrid(
-                    [s0, s1], [side * strip.inner_m, side * strip.outer_m], indexing="ij"
+                top = deck.at(
+                    np.repeat([s0, s1], 2), side * np.tile([strip.inner_m, strip.outer_m], 2)
                 )
-                top = deck.at(s, t).reshape(-1, 3)
                 # A point in the gutter would take the kerb's height from the other side.
                 top[:, 2] = np.tile([strip.inner_z_m, strip.outer_z_m], 2)
                 hulls.append(np.concatenate([top, top - np.array([0.0, 0.0, 0.3])]))

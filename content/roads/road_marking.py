@@ -1,7 +1,7 @@
 """One sign painted on a road: an arrow, a word, a bicycle, a blocked area, a line across a lane."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -11,7 +11,16 @@ from gen_data.assets.family import Solid, check_option
 from gen_data.content.procedural.patches import Array
 from gen_data.content.roads import road, road_materials
 from gen_data.content.roads.deck import PAINT_LIFT_M
-from gen_data.content.roads.painted_signs import ARROWS, arrow, bicycle, hatching, word_polygons
+from gen_data.content.roads.painted_signs import (
+    ARROWS,
+    LETTER_M,
+    STROKE_M,
+    arrow,
+    bicycle,
+    hatching,
+    letter_polygons,
+)
+from gen_data.core.writing import NO_LANGUAGE, Writing
 from gen_data.roads.cross_section import RoadShape
 
 SIGNS = (*ARROWS, "word", "bicycle", "blocked_area", "stop_line", "give_way", "zigzag")
@@ -58,13 +67,46 @@ def road_marking(
     return road_materials.make_street_solid(patches, look, [ground])
 
 
+def road_marking_writing(
+    *,
+    sign: str = "straight",
+    text: str = "_STOP",
+    station_m: float = 20.0,
+    across_m: float = 0.0,
+    turned: float = 0.0,
+    width_m: float = 2.8,
+    **others: Any,
+) -> tuple[Writing, ...]:
+    """A word, in the frame of the mesh; other signs have none. Arguments as above."""
+    word = text.removeprefix("_")
+    if sign != "word" or not word:
+        return ()
+    others.pop("area_m", None)
+    look, shape = road_materials.split_look(others)
+    deck = road.make_deck(RoadShape(**shape), look)
+    corners = np.array([station_m, across_m]) + (-1.0 if turned > 0.0 else 1.0) * np.array(
+        [_corners(letter) for letter in letter_polygons(word, width_m)]
+    )
+    points_m = deck.at(corners[..., 0].ravel(), corners[..., 1].ravel(), _LIFT_M)
+    language = "en" if len(word) > 1 and word.isalpha() else NO_LANGUAGE
+    return (Writing(word, language, points_m.reshape(-1, 4, 3), STROKE_M / LETTER_M),)
+
+
+def _corners(polygons: Sequence[Array]) -> Array:
+    """Corners [4, 2] of a letter in the reader's frame, from its top left clockwise."""
+    points = np.concatenate(polygons)
+    (low, right), (high, left) = points.min(axis=0), points.max(axis=0)
+    return np.array([(high, left), (high, right), (low, right), (low, left)])
+
+
 def _polygons(sign: str, text: str, length_m: float, width_m: float) -> Iterator[Array]:
     """Polygons of a sign in the reader's frame, from its foot."""
     half = 0.5 * width_m
     if sign in ARROWS:
         yield from arrow(sign)
     elif sign == "word":
-        yield from word_polygons(text, width_m)
+        for letter in letter_polygons(text, width_m):
+            yield from letter
     elif sign == "bicycle":
         yield from bicycle()
     elif sign == "stop_line":

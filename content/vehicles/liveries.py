@@ -86,9 +86,10 @@ def vehicle_livery(seed: int, kind: str) -> asset_types.TextureData:
     elif look.pattern == "swoosh":
         arc = [(w * k / 40, h * (0.95 - 0.4 * math.sin(math.pi * k / 60.0))) for k in range(41)]
         draw.polygon([*arc, (w, h), (0, h)], fill=first)
-    art.text(
-        image, (0.3, 0.14, 0.94, 0.46), look.word, first if look.pattern != "lines" else second, 3
-    )
+    ink = first if look.pattern != "lines" else second
+    # Before the trade of a firm is its invented name.
+    language = art.language_of(look.word.rpartition(" ")[2])
+    art.text(image, (0.3, 0.14, 0.94, 0.46), look.word, ink, 3, language)
     if kind == TRADE:
         _draw_emblem(draw, rng.choose(("disc", "square", "bolt")), first, ground)
         number = "".join(str(int(rng.random() * 10)) for _ in range(7))

@@ -17,10 +17,10 @@ from gen_data.content.procedural.material_presets import hex_to_srgb8
 from gen_data.content.procedural.textures import artwork as art
 from gen_data.core.asset_types import TextureData
 from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.writing import NO_LANGUAGE
 
 if TYPE_CHECKING:
     from PIL.Image import Image
-    from PIL.ImageDraw import ImageDraw
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def licence_plate(seed: int, rows: int, country: str, rear: int) -> TextureData:
     lettering = _Lettering(country, variant_rng("licence_plate/symbols", seed))
     _draw_face(face, plate, plate_text(seed, country), rows, lettering)
     image = art.canvas(width, height, hex_to_srgb8(_HOLDER))
-    image.paste(face, ((width - wide) // 2, 0))
+    art.paste(image, face, ((width - wide) // 2, 0))
     return art.resize_texture(image, *_SIZE_PX[rows])
 
 
@@ -183,7 +183,7 @@ def _draw_face(
     if rows == 2:
         first, _, rest = text.replace("-", " ").partition(" ")
         for k, line in enumerate((first, rest)):
-            _write(draw, line, ink, (0.0, k * 0.5 * height, right, 0.5 * height), 0.62, lettering)
+            _write(face, line, ink, (0.0, k * 0.5 * height, right, 0.5 * height), 0.62, lettering)
         return
     top = 0.0
     if plate.title:
@@ -192,10 +192,10 @@ def _draw_face(
     if plate.over:
         line = "".join(_draw_character(place, lettering.rng) for place in plate.over)
         box = (0.2 * width, 0.05 * height, 0.8 * width, 0.3 * height)
-        _write(draw, line, ink, box, 0.85, lettering, small=True)
+        _write(face, line, ink, box, 0.85, lettering, small=True)
         top = 0.26 * height
     box = (left, top, right, height - top)
-    _write(draw, text, ink, box, plate.glyph * height / (height - top), lettering)
+    _write(face, text, ink, box, plate.glyph * height / (height - top), lettering)
 
 
 def _draw_field(face: Image, width: float, code: str) -> None:
@@ -214,7 +214,7 @@ def _draw_field(face: Image, width: float, code: str) -> None:
 
 
 def _write(
-    draw: ImageDraw,
+    face: Image,
     line: str,
     ink: art.Color,
     box: tuple[float, float, float, float],
@@ -224,6 +224,7 @@ def _write(
     small: bool = False,
 ) -> None:
     """Glyphs in the middle of a box (left, top, right, height); a space is half a glyph wide."""
+    draw, boxes = art.pen(face), list[art.Box]()
     left, top, right, height = box
     tall, width = glyph * height, right - left
     advances = [0.5 if letter in " -" else 1.0 for letter in line]
@@ -234,13 +235,19 @@ def _write(
     bottom = top + 0.5 * (height + tall)
     for letter, advance in zip(line, advances, strict=True):
         inset = 0.17 * pitch if advance == 1.0 else -0.08 * pitch
+        ink_px: list[art.Place] = []
         for stroke in lettering.strokes(letter, small=small):
             path = [(x + inset + u * unit[0], bottom - v * unit[1]) for u, v in stroke]
             draw.line(path, fill=ink, width=round(pen_px))
             for px, py in path:
                 r = 0.5 * pen_px
                 draw.ellipse([px - r, py - r, px + r, py + r], fill=ink)
+            ink_px += path
+        if ink_px:
+            (us, vs), half = zip(*ink_px, strict=True), 0.5 * pen_px
+            boxes.append((min(us) - half, min(vs) - half, max(us) + half, max(vs) + half))
         x += pitch * advance
+    art.note(face, line, boxes, pen_px, NO_LANGUAGE)
 
 
 def _draw_character(place: str, rng: VariantRng) -> str:

@@ -35,6 +35,7 @@ TABLE = PluginTable[AnyAnnotator](
         "poses": "gen_data.annotations.poses:Poses",
         "relations": "gen_data.annotations.relations:Relations",
         "semantic_masks": "gen_data.annotations.semantic_masks:SemanticMasks",
+        "text": "gen_data.annotations.text:Text",
         "tracks": "gen_data.annotations.tracks:Tracks",
         "visibility": "gen_data.annotations.visibility:Visibility",
     },

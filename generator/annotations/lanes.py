@@ -1,7 +1,8 @@
 """Lane borders, in the world and in images."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -11,8 +12,8 @@ from pydantic import Field
 from gen_data.config.base_model import Strict
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.lane_geometry import LaneBorder, lane_borders
-from gen_data.core.lane_projection import project_border
+from gen_data.core.lane_geometry import lane_borders
+from gen_data.core.lane_projection import project_borders
 from gen_data.core.sample import BorderTruth, EgoTruth, ImageTruth
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
@@ -43,12 +44,20 @@ class Lanes(Strict):
     ) -> ImageTruth:
         """Fill in ``borders``, in the order of the scene's lanes."""
         del assets
-        found = tuple(
-            line
-            for border in lane_borders(scene.lanes)
-            for line in self._project_border(border, scene, reading)
-        )
-        return replace(truth, borders=found)
+        borders = lane_borders(scene.lanes)
+        numbers, p_camera, uv = project_borders(scene, reading.camera, borders, self.far_m)
+        lines = [start + thin_line(uv[start:end], self.step_px) for start, end in runs(numbers)]
+        rows = np.concatenate([np.zeros(0, np.intp), *lines])
+        visible = is_seen(reading, p_camera[rows], uv[rows]).tolist()
+        points = [(round(u, 2), round(v, 2)) for u, v in uv[rows].tolist()]
+        found, done = [], 0
+        for line in lines:
+            border = borders[numbers[line[0]] >> 32]
+            own = slice(done, done := done + len(line))
+            found.append(
+                BorderTruth(border.name, border.kind, tuple(points[own]), tuple(visible[own]))
+            )
+        return replace(truth, borders=tuple(found))
 
     def annotate_frame(
         self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
@@ -57,40 +66,20 @@ class Lanes(Strict):
         del assets
         return replace(truth, borders=lane_borders(scenes[""].lanes))
 
-    def _project_border(
-        self, border: LaneBorder, scene: Scene, reading: SensorReading
-    ) -> Iterator[BorderTruth]:
-        lens = reading.camera.intrinsics
-        p_camera, uv = project_border(scene, reading.camera, border)
-        near = (p_camera * p_camera).sum(axis=1) < self.far_m**2
-        # NaN, outside the lens's field, compares as False.
-        inside = near & (uv >= 0.0).all(axis=1)
-        inside &= (uv[:, 0] < lens.width_px) & (uv[:, 1] < lens.height_px)
-        for start, end in runs(inside):
-            if end - start < 2:
-                continue
-            rows = start + thin_line(uv[start:end], self.step_px)
-            visible = is_seen(reading, p_camera[rows], uv[rows])
-            yield BorderTruth(
-                border.name,
-                border.kind,
-                tuple((round(float(u), 2), round(float(v), 2)) for u, v in uv[rows]),
-                tuple(bool(seen) for seen in visible),
-            )
 
-
-def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Half-open ranges of consecutive set flags."""
-    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def runs(numbers: NDArray[np.intp]) -> list[tuple[int, int]]:
+    """Half-open ranges of two or more consecutive numbers in an ascending list."""
+    gaps = np.flatnonzero(np.diff(numbers) != 1) + 1
+    return [(a, b) for a, b in pairwise([0, *gaps.tolist(), len(numbers)]) if b - a > 1]
 
 
 def thin_line(uv: Array, step_px: float) -> NDArray[np.intp]:
     """Indices of points about a step apart along a line of image points, including both ends."""
-    lengths = np.sqrt((np.diff(uv, axis=0) ** 2).sum(axis=1))
+    du, dv = (uv[1:] - uv[:-1]).T
+    lengths = np.sqrt(du * du + dv * dv)
     bins = (np.concatenate([[0.0], np.cumsum(lengths)]) / step_px).astype(np.int64)
-    first = np.flatnonzero(np.diff(bins, prepend=-1))
-    return np.unique(np.append(first, len(uv) - 1))
+    first = [0, *(np.flatnonzero(bins[1:] != bins[:-1]) + 1).tolist()]
+    return np.array(first if first[-1] == len(uv) - 1 else [*first, len(uv) - 1])
 
 
 def is_seen(reading: SensorReading, p_camera: Array, uv: Array) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ objects leave no trails. Readings tell only which voxels a sensor has observed.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar, Literal
 
@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from gen_data.annotations.voxel_bodies import BodyVoxels, find_body_voxels
+from gen_data.annotations.voxel_bodies import bodies_near, sample_body
 from gen_data.annotations.voxel_box import VoxelBox
+from gen_data.annotations.voxel_painter import VoxelPainter
 from gen_data.annotations.voxel_views import seen_by_camera, seen_by_scanner
 from gen_data.config.base_model import Strict
 from gen_data.core import capture, errors, interfaces
@@ -136,42 +137,58 @@ def _fill(
     box: VoxelBox, scene: Scene, assets: interfaces.AssetLibrary, own: int
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint8]]:
     """State, instance and surface of all voxels."""
-    state, surface = (np.zeros(math.prod(box.shape), np.uint8) for _ in range(2))
-    owner = np.zeros(math.prod(box.shape), np.uint16)
     T_frame_world = box.T_world_frame.inverse()
+    kept = [body for body in scene.bodies if not own or body.instance_id != own]
     found = [
-        (body.instance_id, voxels)
-        for body in _by_rank(scene, own)
-        if (voxels := find_body_voxels(body, T_frame_world @ body.T_world_body, box, assets))
+        (body.instance_id, samples)
+        for body in _by_rank(bodies_near(kept, T_frame_world, box, assets), scene)
+        if (samples := sample_body(body, T_frame_world @ body.T_world_body, box, assets))
     ]
     # Later ones overwrite earlier ones: interiors first, then what matters most last.
-    state[_below_ground(box, [v for number, v in found if number == 0])] = INTERIOR
-    for number, voxels in found:
-        state[voxels.inside], owner[voxels.inside] = INTERIOR, number
-    for number, voxels in found:
-        state[voxels.surface], owner[voxels.surface] = SURFACE, number
-        surface[voxels.surface] = voxels.kinds
-    surface[state == INTERIOR] = 0
-    return state.reshape(box.shape), owner.reshape(box.shape), surface.reshape(box.shape)
+    painter = VoxelPainter(box)
+    for number, samples in found:
+        ink = _inks(INTERIOR, number, np.zeros(1, np.uint8))
+        painter.paint(samples.inside, samples.onto, ink)
+        if samples.solid is not None:
+            painter.flush()
+            painter.values[samples.solid] = ink[0]
+    for number, samples in found:
+        inks = _inks(SURFACE, number, samples.kinds)
+        is_ground = samples.is_sheet and number == 0
+        if painter.marking != is_ground:
+            painter.flush()
+            painter.marking = is_ground
+        for part in samples.surface:
+            painter.paint(part, samples.onto, inks)
+    painter.flush()
+    values = painter.values
+    state = values.astype(np.uint8)
+    state[(state == 0) & _below(painter.marks)] = INTERIOR
+    values >>= 8
+    surface = values.astype(np.uint8)
+    values >>= 8
+    return state, values.astype(np.uint16), surface
 
 
-def _by_rank(scene: Scene, own: int) -> Iterator[Body]:
-    """Bodies without the carrier's; background first, then instances by falling volume."""
-    volumes = {i.instance_id: math.prod(i.box3d.size_m) for i in scene.instances}
+def _inks(state: int, instance_id: int, kinds: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """Instance (16 bits), kind of surface (8) and state (8) in one number."""
+    return np.asarray((instance_id << 16 | state) + (kinds.astype(np.uint32) << 8), np.uint32)
+
+
+def _by_rank(bodies: Sequence[Body], scene: Scene) -> list[Body]:
+    """Background first, then instances by falling volume."""
+    present = {body.instance_id for body in bodies}
+    volumes = {
+        i.instance_id: math.prod(i.box3d.size_m)
+        for i in scene.instances
+        if i.instance_id in present
+    }
     numbers = sorted(volumes, key=lambda k: (-volumes[k], k))
     ranks = {number: rank for rank, number in enumerate(numbers)}
-    kept = (b for b in scene.bodies if not own or b.instance_id != own)
-    return iter(sorted(kept, key=lambda body: ranks.get(body.instance_id, -1)))
+    return sorted(bodies, key=lambda body: ranks.get(body.instance_id, -1))
 
 
-def _below_ground(box: VoxelBox, background: Sequence[BodyVoxels]) -> NDArray[np.bool_]:
-    """Voxels below the lowest one of sheets such as streets and fields, bool [x * y * z]."""
-    nz = box.shape[2]
-    lowest = np.zeros(math.prod(box.shape) // nz, np.intp)
-    ground = [voxels.surface for voxels in background if voxels.is_sheet]
-    if ground:
-        column, level = np.divmod(np.concatenate(ground), nz)
-        lowest[:] = nz
-        np.minimum.at(lowest, column, level)
-        lowest[lowest == nz] = 0
-    return np.asarray((np.arange(nz) < lowest[:, None]).reshape(-1))
+def _below(ground: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Voxels below the lowest ground of their column, bool [x, y, z]; none without ground."""
+    lowest = ground.argmax(axis=2)
+    return np.asarray(np.arange(ground.shape[2]) < lowest[..., None])

@@ -1,7 +1,7 @@
 """Points on surfaces, followed over a sequence in every sensor."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
@@ -12,7 +12,6 @@ from pydantic import Field
 from gen_data.annotations.sight_lines import MIRRORED, SightLines, cast_rays, trace_sight_lines
 from gen_data.config.base_model import Strict
 from gen_data.core import capture, errors, interfaces, se3
-from gen_data.core.motion import Trajectory
 from gen_data.core.rolling_shutter_projection import camera_poses, project_moving_points
 from gen_data.core.sample import TRACK_STATES, EgoTruth, PointTracks, SensorTracks
 from gen_data.core.scene import Camera, Lidar, Scene
@@ -90,24 +89,28 @@ class Tracks(Strict):
     ) -> EgoTruth:
         """Fill in ``tracks``."""
         points = begun.points
-        p_world = points.in_world(scene, points.on_bodies(scene, view.assets))
+        # Scenes are kept, so that their ids stay theirs.
+        placed: dict[int, _Placed] = {}
+
+        def at(then: Scene) -> _Placed:
+            if id(then) not in placed:
+                p_body = points.on_bodies(then, view.assets)
+                placed[id(then)] = _Placed(then, p_body, points.in_world(then, p_body))
+            return placed[id(then)]
+
         views: dict[int, dict[str, _Projected]] = {}
-        scenes: dict[int, Scene] = {}
         for name, reading in sorted(capture.readings.items()):
-            then = view.at(reading.time_s)
-            scenes[id(then)] = then
-            projected = _project(points, then, reading.camera, view.assets)
-            views.setdefault(id(then), {})[name] = projected
+            then = at(view.at(reading.time_s))
+            projected = _project(points, then, reading.camera)
+            views.setdefault(id(then.scene), {})[name] = projected
         for name, cloud in sorted(capture.clouds.items()):
-            then = view.at(cloud.time_s)
-            scenes[id(then)] = then
-            views.setdefault(id(then), {})[name] = _in_lidar(points, then, cloud.lidar, view.assets)
+            then = at(view.at(cloud.time_s))
+            views.setdefault(id(then.scene), {})[name] = _in_lidar(then, cloud.lidar)
         sensors: dict[str, SensorTracks] = {}
-        for number, then in scenes.items():
-            sensors |= _trace(then, views[number], view.renderer)
-        tracks = PointTracks(
-            begun.instance_id, p_world.astype(np.float32), dict(sorted(sensors.items()))
-        )
+        for number, seen in views.items():
+            sensors |= _trace(placed[number].scene, seen, view.renderer)
+        p_world = at(scene).p_world.astype(np.float32)
+        tracks = PointTracks(begun.instance_id, p_world, dict(sorted(sensors.items())))
         return replace(truth, tracks=tracks)
 
 
@@ -172,6 +175,15 @@ def _locate(
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class _Placed:
+    """The points at one instant: in the frames of their bodies and in the world [m], [n, 3]."""
+
+    scene: Scene
+    p_body: se3.Array
+    p_world: se3.Array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class _Projected:
     """The points in one reading: sensor frame [m], image [px], rays to them, which to trace."""
 
@@ -181,16 +193,13 @@ class _Projected:
     inside: NDArray[np.bool_]
 
 
-def _project(
-    points: SurfacePoints, scene: Scene, camera: Camera, assets: interfaces.AssetLibrary
-) -> _Projected:
-    """Project the points; ``scene`` is at the image's instant."""
-    p_body = points.on_bodies(scene, assets)
-    p_world = points.in_world(scene, p_body)
+def _project(points: SurfacePoints, then: _Placed, camera: Camera) -> _Projected:
+    """Project the points as they are at the image's instant."""
+    p_world = then.p_world
     p_camera = camera.T_world_camera.inverse().apply(p_world)
     lens = camera.intrinsics
     if camera.shutter.rolls:
-        lines, image_px = _rolling_lines(points, scene, camera, p_body)
+        lines, image_px = _rolling_lines(points, then, camera)
     else:
         eye = np.broadcast_to(camera.T_world_camera.translation_m, p_world.shape)
         lines, image_px = SightLines(eye, p_world), lens.project(p_camera)
@@ -199,11 +208,9 @@ def _project(
     return _Projected(p_camera, image_px, lines, inside)
 
 
-def _in_lidar(
-    points: SurfacePoints, scene: Scene, lidar: Lidar, assets: interfaces.AssetLibrary
-) -> _Projected:
-    """The points in the frame of a scanner, all around it; ``scene`` is at the scan's instant."""
-    p_world = points.in_world(scene, points.on_bodies(scene, assets))
+def _in_lidar(then: _Placed, lidar: Lidar) -> _Projected:
+    """The points at the scan's instant in the frame of a scanner, all around it."""
+    p_world = then.p_world
     p_lidar = lidar.T_world_lidar.inverse().apply(p_world)
     eye = np.broadcast_to(lidar.T_world_lidar.translation_m, p_world.shape)
     nowhere = np.full((len(p_world), 2), np.nan)
@@ -227,28 +234,10 @@ def _trace(
 
 
 def _rolling_lines(
-    points: SurfacePoints, scene: Scene, camera: Camera, p_body: se3.Array
+    points: SurfacePoints, then: _Placed, camera: Camera
 ) -> tuple[SightLines, se3.Array]:
     """Rays at the instants of the rows that show the points, and image coordinates [px]."""
-    p_world = points.in_world(scene, p_body)
-    movers = list(_movers(points, scene))
-
-    def world(delays_s: se3.Array) -> se3.Array:
-        places = p_world.copy()
-        for track, rows in movers:
-            R, t = track.poses(scene.time_s + delays_s[rows])
-            places[rows] = np.einsum("nij,nj->ni", R, p_body[rows], optimize=False) + t
-        return np.asarray(places)
-
-    _, image_px, delays_s = project_moving_points(scene, camera, world, len(p_body))
-    _, eyes = camera_poses(scene, camera, delays_s)
+    world = points.moving(then.scene, then.p_body)
+    _, image_px, delays_s = project_moving_points(then.scene, camera, world, len(then.p_body))
+    _, eyes = camera_poses(then.scene, camera, delays_s)
     return SightLines(eyes, world(delays_s), delays_s), image_px
-
-
-def _movers(points: SurfacePoints, scene: Scene) -> Iterator[tuple[Trajectory, slice]]:
-    """Trajectories of the bodies with points, and their rows."""
-    tracks = {track.body: track for track in scene.tracks}
-    for number, rows in points.by_body():
-        track = tracks.get(scene.bodies[number].name)
-        if track is not None:
-            yield track, rows

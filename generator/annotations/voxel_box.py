@@ -1,11 +1,25 @@
 """A box of voxels in a frame."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.core.se3 import SE3, Array, Vec3
+
+MARGIN_VOXELS, ROUNDING = 0.05, 1e-6
+"""Margin around the box within which points count as possibly inside, and its share of places, for
+the rounding of 32-bit numbers."""
+
+
+def turned(row: Sequence[Array] | Array, xyz: Sequence[Array] | Array) -> Array:
+    """Coordinate of vectors [3, n] along a row of a rotation, [n].
+
+    In the order in which NumPy's ``einsum`` adds, so that bytes are the same as with ``SE3``.
+    """
+    return np.asarray((row[0] * xyz[0] + row[2] * xyz[2]) + row[1] * xyz[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +37,11 @@ class VoxelBox:
     low_m: Vec3
     voxel_m: float
     shape: tuple[int, int, int]
+
+    @property
+    def count(self) -> int:
+        """Number of voxels."""
+        return math.prod(self.shape)
 
     @property
     def high_m(self) -> Vec3:
@@ -51,22 +70,64 @@ class VoxelBox:
                 return False
         return True
 
-    def numbers(
-        self, T_frame_points: SE3, points_m: NDArray[np.floating], scale: float = 1.0
-    ) -> NDArray[np.intp]:
-        """Numbers of the voxels that contain points [n, 3], in order of X, Y, Z; -1 = outside.
-
-        The points are scaled, then in the frame at ``T_frame_points``.
-        """
+    def map_from(self, T_frame_points: SE3, scale: float = 1.0) -> "VoxelMap":
+        """Map of points that are scaled, then in the frame at ``T_frame_points``."""
         rows = (scale / self.voxel_m * T_frame_points.rotation()).astype(np.float32)
         shift = np.subtract(T_frame_points.translation_m, self.low_m) / self.voxel_m
-        x, y, z = (np.ascontiguousarray(column, np.float32) for column in points_m.T)
-        number = np.zeros(len(points_m), np.intp)
-        inside = np.ones(len(points_m), np.bool_)
-        for row, start, count in zip(rows, shift.astype(np.float32), self.shape, strict=True):
-            place = row[0] * x + row[1] * y + row[2] * z + start
-            inside &= (place >= 0.0) & (place < count)
-            number *= count
-            number += place.astype(np.intp)
-        number[~inside] = -1
+        return VoxelMap(rows[..., None], shift.astype(np.float32)[:, None], self.shape)
+
+    def numbers(self, place: NDArray[np.float32]) -> NDArray[np.intp]:
+        """Numbers of the voxels at places [3, n]; ``count`` for places outside."""
+        outside = (place < 0.0) | (place >= np.array(self.shape, np.float32)[:, None])
+        number = self.ravel(place.astype(np.int32))
+        number[outside[0] | outside[1] | outside[2]] = self.count
         return number
+
+    def ravel(self, voxels: NDArray[np.int32]) -> NDArray[np.intp]:
+        """Numbers of voxels [3, n] in order of X, Y, Z; overwrites the indices along X."""
+        x, y, z = voxels
+        _, ny, nz = self.shape
+        x *= ny
+        x += y
+        x *= nz
+        x += z
+        return np.asarray(x, np.intp)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class VoxelMap:
+    """Map from coordinates of points [m] to those in a box, in voxels from its lowest corner.
+
+    Attributes:
+        rows: Linear part, float32 [3, 3, 1].
+        start: Place of the origin, float32 [3, 1].
+        shape: Voxels of the box along X, Y and Z.
+    """
+
+    rows: NDArray[np.float32]
+    start: NDArray[np.float32]
+    shape: tuple[int, int, int]
+
+    def places(
+        self,
+        xyz_m: NDArray[np.float32],
+        out: NDArray[np.float32] | None = None,
+        scratch: NDArray[np.float32] | None = None,
+    ) -> NDArray[np.float32]:
+        """Places of points [3, n], written to ``out`` [3, n]; ``scratch`` is overwritten too."""
+        out = np.multiply(self.rows[:, 0], xyz_m[0], out=out)
+        for axis in (1, 2):
+            out += np.multiply(self.rows[:, axis], xyz_m[axis], out=scratch)
+        out += self.start
+        return out
+
+    def may_contain(
+        self, middle_m: NDArray[np.float32], half_m: NDArray[np.float32]
+    ) -> NDArray[np.bool_]:
+        """Whether bounds [3, k] of points may overlap the box, bool [k]."""
+        rows = self.rows[..., 0]
+        middle = rows @ middle_m + self.start
+        size = np.abs(rows) @ (np.abs(middle_m) + half_m) + np.abs(self.start)
+        reach = np.abs(rows) @ half_m + MARGIN_VOXELS + ROUNDING * size
+        top = np.array(self.shape, np.float32)[:, None]
+        return np.asarray(((middle + reach >= 0.0) & (middle - reach <= top)).all(axis=0))

@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache, partial
 import cv2
 
 from gen_data.annotations.annotate import annotate_ego, annotate_reading
+from gen_data.annotations.text import Text
 from gen_data.assemble import plugin_tables, preflight
 from gen_data.assemble.config import Config, SceneConfig
 from gen_data.assets.library import Library
@@ -18,15 +19,17 @@ from gen_data.core import interfaces, path_names, plates
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError, ConfigWarning, Refusals, UnknownAsset
 from gen_data.core.scene import LABEL_IDS_MAX, Scene, SharedValue
-from gen_data.exporters.base import ExporterBase, check_image_formats
+from gen_data.exporters.base import ExporterBase, check_delivery, check_image_formats
 from gen_data.exporters.label_map import MappedExporter
 from gen_data.packs.provision import open_assets
 from gen_data.physics import missing_engine, open_engine
 from gen_data.pipeline import Pipeline, exporter_views, pipeline
+from gen_data.pipeline.delivered import delivered
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.scene_templates.builder import build_scene
 from gen_data.sensors.camera.plate_camera import PlateCamera
 from gen_data.sensors.mounting import check_not_buried, stride, within_steps
+from gen_data.sensors.sensor_faults import faults_of
 
 NOMINAL_SCENES_KEPT = 32
 
@@ -107,9 +110,19 @@ class PipelineFactory:
         for probe, scene in zip(config.probes, self.nominal, strict=True):
             with refused.collected():
                 check_scene(config, scene)
-            for error in preflight.unrectified_pairs(probe, scene, self.library):
+            for error in (
+                *preflight.unrectified_pairs(probe, scene, self.library),
+                *preflight.tiny_fiducials(probe, scene, self.library),
+            ):
                 with refused.collected(), located_errors(config.document):
                     raise error
+        if any(isinstance(annotator, Text) for annotator in annotators_of(config)):
+            asking = (e.type for e in config.exporters if "text" in exporter_views.needs_of(e))
+            place = "annotations.text"
+            if "text" not in config.annotations:
+                place = f"exporter '{next(asking)}'"
+            with refused.collected(), located_errors(config.document):
+                preflight.check_text(config.probes, self.nominal, self.library, place)
         refused.raise_if_any()
         self._warn_of_doubtful_scenes()
 
@@ -226,13 +239,17 @@ def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> interfa
         n=n,
         views_per_scene=config.general.samples_per_scene // config.general.steps_per_scene,
         categories=categories,
-        sensors=tuple(sorted((s.describe() for s in config.sensors), key=lambda s: s.name)),
+        sensors=tuple(sorted(map(_described, config.sensors), key=lambda s: s.name)),
         depth_scale_m=config.general.depth_scale_m,
         steps_per_scene=config.general.steps_per_scene,
         step_s=config.general.step_s,
         publication=interfaces.Publication(**config.general.dataset.model_dump()),
         twins=config.general.twins,
     )
+
+
+def _described(sensor: interfaces.Sensor) -> interfaces.SensorInfo:
+    return replace(sensor.describe(), faults=faults_of(sensor).kinds)
 
 
 def _check_durations(config: Config) -> None:
@@ -437,8 +454,9 @@ def ready_exporters(
         with refused.collected(), located_errors(config.document):
             if not isinstance(exporter, exporter_views.ExporterView):
                 check_image_formats(own, info)
+                check_delivery(own, info)
         with refused.collected(), located_errors(config.document):
             exporter.check(info)
-        exporters[exporter.type] = exporter.with_assets(library)
+        exporters[exporter.type] = delivered(own, exporter, info).with_assets(library)
     refused.raise_if_any()
     return exporters

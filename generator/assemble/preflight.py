@@ -5,13 +5,22 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from gen_data.annotations.text import can_write
 from gen_data.assemble.config import SceneConfig
+from gen_data.assets.families import known_families
+from gen_data.assets.family import Family
+from gen_data.assets.library import Library
 from gen_data.core import errors, interfaces, scene_time, stereo, streams
 from gen_data.core.scene import Camera, Region, Scene
+from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.randomizers.rig_calibration import RigCalibration
 from gen_data.randomizers.room_path import RoomPath
 from gen_data.scene_templates.carrier import Carrier
 
+FIDUCIAL = "fiducial"
+"""Tag of markers and calibration boards."""
+LENS_CHANGE = 2.0
+"""Largest factor by which randomizers are assumed to lengthen a lens."""
 PAIR_REMEDY = (
     "mount them on one rig with the same size, field of view, lens and angles, the right one "
     "beside the left, and vary neither alone by a randomizer"
@@ -57,6 +66,86 @@ def _fault_of_pair(left: Camera, right: Camera) -> str:
     except ValueError as error:
         return str(error)
     return ""
+
+
+def tiny_fiducials(
+    config: SceneConfig, scene: Scene, assets: interfaces.AssetIndex
+) -> Iterator[errors.ConfigError]:
+    """Markers and boards that are smaller than a pixel in every image, as with a wrong unit.
+
+    Only where all cameras are placed at stated distances from the scene's focus: then no draw
+    brings a marker nearer. ``LENS_CHANGE`` allows for lenses that vary.
+    """
+    orbits = [r for r in config.randomizers if isinstance(r, CameraPose)]
+    if not orbits or any(r.fills or r.rig or r.aim.outcomes() != ("",) for r in orbits):
+        return
+    if any(camera.rig or not _placed_by(camera, orbits) for camera in scene.cameras):
+        return
+    focus = np.array(scene.focus.center_m)
+    for body in scene.bodies:
+        if FIDUCIAL not in assets.get(body.asset).tags:
+            continue
+        low, high = np.array(assets.bounds_m(body.asset)) * body.scale
+        size_m, away_m = (
+            np.linalg.norm(high - low),
+            np.linalg.norm(high)
+            + np.linalg.norm(np.array(body.T_world_body.translation_m) - focus),
+        )
+        widths = []
+        for camera in scene.cameras:
+            near_m = min(
+                r.distance_m.support()[0] - math.sqrt(3) * r.jitter_m.support()[1]
+                for r in _placed_by(camera, orbits)
+            )
+            lens = camera.intrinsics
+            sharp_px = LENS_CHANGE * max(lens.fx_px, lens.fy_px)
+            widths.append(sharp_px * size_m / max(near_m - away_m, 1e-3))
+        if max(widths, default=math.inf) < 1.0:
+            yield errors.ConfigError(
+                f"elements.{body.name}.asset: '{body.asset}' is {max(widths):.2g} px long at most "
+                "in all images; expected at least one pixel: a larger one, more pixels "
+                "(size_px), or a camera that comes nearer (distance_m)"
+            )
+
+
+def _placed_by(camera: Camera, orbits: Iterable[CameraPose]) -> list[CameraPose]:
+    return [orbit for orbit in orbits if orbit.camera in ("", camera.name)]
+
+
+def check_text(
+    configs: Iterable[SceneConfig], scenes: Iterable[Scene], assets: Library, place: str
+) -> None:
+    """Refuse scenes in which nothing can be written on; ``place`` begins the message.
+
+    Raises:
+        ConfigError: no body, and no asset that may be added, has a texture with text.
+    """
+    ids: dict[str, None] = {}
+    for config, scene in zip(configs, scenes, strict=True):
+        textures = (material.texture for body in scene.bodies for material in body.materials)
+        if can_write(assets, (*textures, *(body.asset for body in scene.bodies))):
+            return
+        ids |= dict.fromkeys(body.asset for body in scene.bodies)
+        ids |= dict.fromkeys(asset for group in scene.groups for asset in group.assets)
+        for randomizer in config.randomizers:
+            ids |= dict.fromkeys(randomizer.possible_assets(assets))
+    # One variant of each family first: most families have text on all variants or on none.
+    turns: dict[str, int] = {}
+    order = {}
+    for asset_id in ids:
+        family = asset_id.partition("?")[0]
+        turns[family] = order[asset_id] = turns.get(family, -1) + 1
+    known = known_families()
+    for asset_id in sorted(ids, key=order.__getitem__):
+        # Of files it is not known what is on their images.
+        if isinstance(known.get(asset_id.partition("?")[0]), Family):
+            own = tuple(material.texture for material in assets.materials(asset_id))
+            if can_write(assets, (asset_id, *own)):
+                return
+    raise errors.ConfigError(
+        f"{place}: nothing in the scenes is written on; add objects with print, such as "
+        "assets: {tags: [printed]}, signs, vehicles or buildings, or leave it out"
+    )
 
 
 def far_sensors(config: SceneConfig, scene: Scene) -> Iterator[str]:

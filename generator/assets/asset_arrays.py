@@ -1,7 +1,7 @@
 """Lossless conversion of meshes, collision parts and images to plain arrays and back."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +11,7 @@ from gen_data.assets.importer import FileRemarks, ImportedMesh
 from gen_data.core.asset_types import ConvexParts, Keypoint, Material, MeshData, TextureData, UInt8
 from gen_data.core.se3 import Vec3
 from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.core.writing import Writing
 
 _MESH_ARRAYS = ("vertices_m", "faces", "normals", "uvs", "face_slots")
 _IMAGE = "image/"
@@ -87,6 +88,22 @@ def pack_texture(texture: TextureData) -> Arrays:
 def unpack_texture(arrays: Arrays) -> TextureData:
     """Restore a texture. Raises KeyError if the arrays hold none."""
     return TextureData(arrays["albedo"], **{name: arrays.get(name) for name in _OPTIONAL_IMAGES})
+
+
+def pack_writing(lines: Sequence[Writing]) -> Arrays:
+    """Convert lines of text to plain arrays."""
+    facts = [(w.text, w.language, w.stroke, w.kind, len(w.quads)) for w in lines]
+    quads = [line.quads for line in lines] or [np.zeros((0, 4, 2))]
+    return {"lines": encode_text(canonical_json(facts)), "quads": np.concatenate(quads)}
+
+
+def unpack_writing(arrays: Arrays) -> tuple[Writing, ...]:
+    """Restore lines of text. Raises KeyError if the arrays hold none."""
+    facts, start, lines = json.loads(arrays["lines"].tobytes()), 0, []
+    for text, language, stroke, kind, count in facts:
+        lines.append(Writing(text, language, arrays["quads"][start : start + count], stroke, kind))
+        start += count
+    return tuple(lines)
 
 
 def encode_text(text: str) -> UInt8:

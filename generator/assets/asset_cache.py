@@ -19,6 +19,7 @@ import struct
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -47,6 +48,10 @@ _ALIGNMENT = 64
 _MAPPED_BYTES_MIN = 64 * 1024
 _CHUNK_BYTES = 256 * 1024
 _INTACT_FILES = 16_384
+_CHECKED = "user.gen_data.checked"
+"""Attribute of a large file: its version whose checksum was found right, and when."""
+_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+"""Of Linux: differs after each start of the machine."""
 
 
 def content_key(description: Mapping[str, Any]) -> str:
@@ -201,8 +206,10 @@ def _decode_checked(data: bytes | memoryview, key: str) -> Arrays | None:
 def _load(path: str, key: str, intact: CountCache[None]) -> Arrays | None:
     """Load the arrays of a file; None if it is missing, damaged, or has another key.
 
-    Files with a right checksum are noted in ``intact``: later loads, of which there are hundreds
-    per scene, need not read them as a whole again unless they have been replaced.
+    Large files with a right checksum are noted in ``intact``, and on themselves for other
+    processes until the machine starts again, since a loss of power may damage files: later loads,
+    of which there are hundreds per scene, need not read them as a whole again unless they have
+    changed.
     """
     try:
         with open(path, "rb") as file:  # noqa: PTH123
@@ -211,12 +218,33 @@ def _load(path: str, key: str, intact: CountCache[None]) -> Arrays | None:
             if facts.st_size < _MAPPED_BYTES_MIN:
                 return decode_arrays(file.read(), key)
             if version not in intact:
-                if not _is_intact(file):
-                    return None
+                if not _is_noted(file, version):
+                    if not _is_intact(file):
+                        return None
+                    _note(file, version)
                 intact.get(version, lambda: None)
             return _decode_checked(map_file(file.fileno(), facts.st_size), key)
     except OSError:
         return None
+
+
+def _is_noted(file: BinaryIO, version: str) -> bool:
+    """Whether the file states that this version of it was checked; False where it cannot."""
+    try:
+        return os.getxattr(file.fileno(), _CHECKED) == f"{version} {_boot()}".encode()
+    except (OSError, AttributeError):
+        # Not noted, or no attributes: on this file system, or at all, as on macOS.
+        return False
+
+
+def _note(file: BinaryIO, version: str) -> None:
+    with contextlib.suppress(OSError, AttributeError):
+        os.setxattr(file.fileno(), _CHECKED, f"{version} {_boot()}".encode())
+
+
+@cache
+def _boot() -> str:
+    return _BOOT_ID.read_text("ascii").strip()
 
 
 def _is_intact(file: BinaryIO) -> bool:

@@ -61,17 +61,9 @@ def drape(level: ImportedMesh, place: AssetId, kind: str) -> ImportedMesh:
     Raises:
         AssetError: the parameters are wrong, or the asset has no mesh.
     """
-    at, numbers = place.parameters.get("at"), place.parameters["relief"]
-    if not (isinstance(at, tuple) and len(at) == 4 and at[3] > 0.0 and isinstance(numbers, tuple)):
-        raise AssetError(f"asset '{place}': expected at=x,y,yaw,scale and the numbers of a relief")
+    ground = _ground_below(place)
     if level.mesh is None:
         raise AssetError(f"asset '{place}': has no mesh to lay on the ground")
-    x_m, y_m, yaw, scale = at
-    try:
-        relief = Relief.of(numbers)
-    except ValueError as error:
-        raise AssetError(f"asset '{place}': {error}") from error
-    ground = _Ground(relief, SE3.about_z(yaw, (x_m, y_m, 0.0)), scale)
     collision = level.collision
     if collision is not None:
         collision = ConvexParts(_raised_parts(collision.parts_m, ground))
@@ -82,6 +74,23 @@ def drape(level: ImportedMesh, place: AssetId, kind: str) -> ImportedMesh:
         keypoints=tuple(_raised_point(point, ground) for point in level.keypoints),
         body_bounds_m=None,
     )
+
+
+def raised(points_m: Array, place: AssetId) -> Array:
+    """Points [..., 3] on a level asset as ``drape`` raises them. Raises AssetError as it does."""
+    return _ground_below(place).raised(points_m.reshape(-1, 3)).reshape(points_m.shape)
+
+
+def _ground_below(place: AssetId) -> "_Ground":
+    at, numbers = place.parameters.get("at"), place.parameters["relief"]
+    if not (isinstance(at, tuple) and len(at) == 4 and at[3] > 0.0 and isinstance(numbers, tuple)):
+        raise AssetError(f"asset '{place}': expected at=x,y,yaw,scale and the numbers of a relief")
+    x_m, y_m, yaw, scale = at
+    try:
+        relief = Relief.of(numbers)
+    except ValueError as error:
+        raise AssetError(f"asset '{place}': {error}") from error
+    return _Ground(relief, SE3.about_z(yaw, (x_m, y_m, 0.0)), scale)
 
 
 class _Ground:

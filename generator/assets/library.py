@@ -2,17 +2,26 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from gen_data.assets import families, family_parameters, file_library, paths, procedural_library
+from gen_data.assets import (
+    asset_arrays,
+    families,
+    family_parameters,
+    file_library,
+    paths,
+    procedural_library,
+)
 from gen_data.assets.asset_cache import Arrays, DiskCache, Store, content_key
 from gen_data.assets.asset_ids import AssetId, parse_asset_id
 from gen_data.assets.importer import FileRemarks, ImportedMesh
 from gen_data.core import asset_types, colorimetry, plates, scene, se3, serialization
 from gen_data.core.bounded_cache import CountCache
 from gen_data.core.errors import AssetError, UnknownAsset, did_you_mean
+from gen_data.core.writing import Writing
 
 VEHICLES = frozenset(
     {"bus", "car", "caravan", "minibus", "motorcycle", "suv", "trailer", "tram", "truck", "van"}
@@ -21,8 +30,10 @@ VEHICLES = frozenset(
 _ENTRIES = 8192
 _SUMMARIES = 4096
 """Kept in memory: about 1 and 5 kB each."""
-_BOUNDS = "bounds 1"
-"""Name of stored bounds; it changes with their definition."""
+_BOUNDS, _WRITING = "bounds 1", "writing 2"
+"""Names of stored bounds and lines of text; they change with their definitions."""
+_WRITES = "writing"
+"""Fact of families with text: true for textures, a function of an object's arguments."""
 
 
 def open_library(
@@ -85,6 +96,7 @@ class Library:
         self._summaries: CountCache[_MeshSummary] = CountCache(_SUMMARIES)
         self._boxes: CountCache[tuple[Bounds, ...]] = CountCache(_SUMMARIES)
         self._mean_colors: CountCache[se3.Vec3] = CountCache(_SUMMARIES)
+        self._writing: CountCache[tuple[Writing, ...]] = CountCache(_SUMMARIES)
 
     def get(self, asset_id: str) -> asset_types.Asset:
         """Description of an asset. Raises UnknownAsset if there is none."""
@@ -253,6 +265,17 @@ class Library:
             return self._generated.texture(parse_asset_id(texture_id))
         return self._files.texture(texture_id)
 
+    def writing(self, asset_id: str) -> tuple[Writing, ...]:
+        """Lines of text on a texture or an object's mesh; see ``WrittenAssets``."""
+        if not families.declared(asset_id, _WRITES, default=False):
+            return ()
+
+        def read() -> tuple[Writing, ...]:
+            compute = partial(self._generated.writing, parse_asset_id(asset_id))
+            return asset_arrays.unpack_writing(self.derived(asset_id, _WRITING, compute))
+
+        return self._writing.get(asset_id, read)
+
     def mean_color(self, texture_id: str) -> se3.Vec3:
         """Mean reflectance of a texture, linear RGB."""
 
@@ -372,5 +395,10 @@ def check_finite(asset_id: str, mesh: asset_types.MeshData) -> None:
         if not np.isfinite(values).all():
             number = int(np.argwhere(~np.isfinite(values))[0, 0])
             raise AssetError(f"asset '{asset_id}': {name}[{number}] is NaN or infinite")
-    if field := serialization.find_not_finite(serialization.to_plain(mesh.materials), "materials"):
-        raise AssetError(f"asset '{asset_id}': {field} is NaN or infinite")
+    try:
+        # Much faster than looking for a place, and refuses the same numbers.
+        serialization.canonical_json(mesh.materials)
+    except ValueError:
+        plain = serialization.to_plain(mesh.materials)
+        field = serialization.find_not_finite(plain, "materials")
+        raise AssetError(f"asset '{asset_id}': {field} is NaN or infinite") from None

@@ -14,6 +14,7 @@ from gen_data.core.asset_types import Asset, Float32, Symmetry, TextureData
 from gen_data.core.bounded_cache import CountCache, Sized
 from gen_data.core.errors import AssetError, did_you_mean
 from gen_data.core.variant_rng import Draw, drawing
+from gen_data.core.writing import Writing, recording
 
 VERSION = 4
 """Increased whenever code shared by all families generates different geometry."""
@@ -137,6 +138,25 @@ class ProceduralLibrary:
             asset_id, family, compute, asset_arrays.pack_texture, asset_arrays.unpack_texture
         )
 
+    def writing(self, asset_id: AssetId) -> asset_cache.Arrays:
+        """Lines of text as ``pack_writing`` has them; makes a texture.
+
+        Of a family that declares ``writing``.
+        """
+        family, parts = self._families[asset_id.name], self._split_draped(asset_id)
+        try:
+            if parts:
+                level = _lines_of_object(parts[0], family)
+                lines = [replace(w, quads=drape.raised(w.quads, parts[1])) for w in level]
+            elif isinstance(family, Family):
+                lines = _lines_of_object(asset_id, family)
+            else:
+                with recording() as lines:
+                    _make(asset_id, family)
+        except ValueError as error:
+            raise AssetError(f"asset '{asset_id}': {error}") from error
+        return asset_arrays.pack_writing(lines)
+
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
         family = self._find(asset_id, EnvironmentFamily, "an environment")
@@ -199,6 +219,13 @@ class ProceduralLibrary:
 
 def _draped_key(level: str, place: AssetId) -> str:
     return asset_cache.content_key({"level": level, "place": str(place), "version": drape.VERSION})
+
+
+def _lines_of_object(asset_id: AssetId, family: AnyFamily) -> list[Writing]:
+    """Lines on a mesh, by the function that its family declares."""
+    write = family.declares["writing"]
+    assert callable(write), "of objects it is a function"
+    return list(_call(write, asset_id, family)[0])
 
 
 def _is_offered(asset_id: AssetId, family: AnyFamily) -> bool:

@@ -8,7 +8,8 @@ from gen_data.config import problems, yaml_tree
 from gen_data.core.errors import ConfigError
 
 _FIELD = re.compile(
-    r"(?P<list>elements|randomizers|sensors)\.(?P<name>[\w-]+)(\.(?P<field>[\w.]+))?: (?P<fact>.*)",
+    r"(?P<list>elements|randomizers|sensors|annotations)\.(?P<name>[\w-]+)"
+    r"(\.(?P<field>[\w.]+))?: (?P<fact>.*)",
     re.DOTALL,
 )
 _SECTION = re.compile(r"(?P<field>render\.[\w.]+): (?P<fact>.*)", re.DOTALL)
@@ -20,7 +21,8 @@ def located_errors(document: yaml_tree.Node) -> Iterator[None]:
     """Add ``file:line:column`` to a ConfigError of a plug-in of a document.
 
     Its message begins with ``elements.<name>.<field>:``, ``randomizers...``, ``sensors...``,
-    ``sensor '<name>':``, ``exporter '<type>':`` or ``render.<field>:``; others stay as they are.
+    ``annotations...``, ``sensor '<name>':``, ``exporter '<type>':`` or ``render.<field>:``; others
+    stay as they are.
     """
     try:
         yield
@@ -53,6 +55,8 @@ def _find_item(document: yaml_tree.Node, key: str, name: str) -> int | None:
     items = document.entries[key].items if key in document.entries else ()
     for tag in ("name", "type"):
         for number, item in enumerate(items):
+            if item.content == name:
+                return number
             node = item.get(tag)
             if node is not None and node.content == name:
                 return number

@@ -1,7 +1,7 @@
 """Readings of sensors: images, point clouds and measurements."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Literal
@@ -373,3 +373,10 @@ class Capture:
     readings: Mapping[str, SensorReading]
     clouds: Mapping[str, PointCloud] = field(default_factory=dict)
     tables: Mapping[str, Measurements] = field(default_factory=dict)
+
+    def faults(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        """Name of each sensor, and the faults of its reading; empty = none."""
+        read: Mapping[str, SensorReading | PointCloud | Measurements]
+        for read in (self.readings, self.clouds, self.tables):
+            for name in sorted(read):
+                yield name, read[name].faults

@@ -24,7 +24,7 @@ compute ids instead of counting.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
@@ -32,7 +32,15 @@ from typing import Any, Literal, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
-from gen_data.core import asset_types, errors, measurement_dtypes, plates, se3, streams
+from gen_data.core import (
+    asset_types,
+    errors,
+    measurement_dtypes,
+    plates,
+    se3,
+    serialization,
+    streams,
+)
 from gen_data.core.capture import (
     PNG,
     Capture,
@@ -47,6 +55,7 @@ from gen_data.core.capture import (
 from gen_data.core.lens import LensModel
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
 from gen_data.core.scene import Camera, Lane, Lidar, Scene, StageModel
+from gen_data.core.writing import Writing
 
 
 class Stage(str, Enum):
@@ -180,6 +189,18 @@ class DerivedArrays(Protocol):
             asset_id: Also ``<asset>#<image>``.
             name: Of the computation and everything else that the result depends on.
             compute: Computes them; its result depends on the asset and the name alone.
+        """
+        ...
+
+
+@runtime_checkable
+class WrittenAssets(Protocol):
+    """An AssetLibrary that knows what is written on its textures and meshes."""
+
+    def writing(self, asset_id: str) -> tuple[Writing, ...]:
+        """Lines of text on a texture, or of a mesh itself, in the order of drawing.
+
+        Empty for assets without text, and for files. Raises AssetError as the library.
         """
         ...
 
@@ -379,6 +400,8 @@ class SensorInfo:
         motion_distortion: Laser scanners: the frame of points: ``raw``, that of each pulse's own
             instant; ``deskewed``, that of the sweep's middle; ``none``, all pulses leave then.
         needs_clear_view: Whether a position inside the body that carries it is refused.
+        faults: Kinds of errors in what it reports: ``clock``, ``extrinsics``, ``lost``,
+            ``doubled``.
     """
 
     name: str
@@ -394,6 +417,7 @@ class SensorInfo:
     rgb_encoding: ImageEncoding = PNG
     origins: bool = False
     motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
+    faults: tuple[str, ...] = field(default=(), metadata={serialization.SPARSE: True})
 
 
 class Sensor(Protocol):

@@ -3,7 +3,6 @@
 import math
 from bisect import bisect_right
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -16,6 +15,8 @@ Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 _ARC_LENGTHS: ObjectCache[tuple[float, ...]] = ObjectCache(1024)
 """Of the points of the latest lanes: a street has about a hundred."""
+_BORDERS: ObjectCache[tuple["LaneBorder", ...]] = ObjectCache(16)
+"""Of the latest streets."""
 MEETING_M = 0.25
 """Borders with ends nearer to each other than this are the same."""
 
@@ -48,11 +49,11 @@ class LaneLine:
         """
         points = self.lane.center_m
         k = min(max(bisect_right(self.at_m, at_m) - 1, 0), len(points) - 2)
-        a, b = points[k], points[k + 1]
+        (ax, ay, az), (bx, by, bz) = points[k], points[k + 1]
         span_m = self.at_m[k + 1] - self.at_m[k]
         t = min(max((at_m - self.at_m[k]) / span_m, 0.0), 1.0)
-        yaw = math.atan2(b[1] - a[1], b[0] - a[0])
-        x, y, z = (p + t * (q - p) for p, q in zip(a, b, strict=True))
+        yaw = math.atan2(by - ay, bx - ax)
+        x, y, z = ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az)
         return SE3.about_z(yaw, (x - left_m * math.sin(yaw), y + left_m * math.cos(yaw), z))
 
 
@@ -97,9 +98,12 @@ class LaneBorder:
     points_m: tuple[Vec3, ...]
 
 
-@lru_cache(maxsize=16)
 def lane_borders(lanes: tuple[Lane, ...]) -> tuple[LaneBorder, ...]:
     """Borders of all driving lanes outside junctions, each once, in the order of the lanes."""
+    return _BORDERS.get(lanes, lambda: _find_borders(lanes))
+
+
+def _find_borders(lanes: tuple[Lane, ...]) -> tuple[LaneBorder, ...]:
     driving = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]
     borders: list[LaneBorder] = []
     alone: dict[Side, list[tuple[Vec3, Vec3]]] = {"left": [], "right": []}
@@ -128,7 +132,7 @@ def border_line(lane: Lane, side: Side) -> tuple[Vec3, ...]:
     half_m = 0.5 * lane.width_m * sign
     points = center + half_m * left_normals(center)
     points[:, 2] += half_m * np.asarray(lane.banks or lane.bank)
-    return tuple((float(x), float(y), float(z)) for x, y, z in np.round(points, 6) + 0.0)
+    return tuple((x, y, z) for x, y, z in (np.round(points, 6) + 0.0).tolist())
 
 
 def left_normals(line_m: Array) -> Array:

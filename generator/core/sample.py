@@ -12,6 +12,7 @@ from gen_data.core import boxes, lane_geometry, se3, serialization
 from gen_data.core.capture import Capture
 from gen_data.core.motion import STILL, Twist
 from gen_data.core.scene import Camera, Instance, Scene
+from gen_data.core.writing import Kind
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -142,6 +143,77 @@ class BorderTruth:
     visible: tuple[bool, ...]
 
 
+QuadPx = tuple[PointPx, PointPx, PointPx, PointPx]
+"""Image coordinates of four corners, from the top left of the upright text clockwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class CharacterTruth:
+    """A character of a word in one image.
+
+    Attributes:
+        text: The character; empty for strokes that only look like writing.
+        quad_px: Corners of its ink; they may lie outside the image.
+        visible_fraction: Visible share of the quad, inside and outside the image.
+    """
+
+    text: str
+    quad_px: QuadPx
+    visible_fraction: float
+
+
+@dataclass(frozen=True, slots=True)
+class WordTruth:
+    """A word in one image: the characters between two spaces.
+
+    Attributes:
+        text: Its characters; empty for strokes that only look like writing.
+        quad_px: Corners of its ink; they may lie outside the image.
+        characters: In reading order.
+        visible_fraction: Visible share of its characters' quads, inside and outside the image.
+        height_px: Height of its highest character.
+        stroke_px: Width of its strokes, in the direction in which the image shortens them most.
+        readable: Whether its size and visibility suffice to read it; see the annotation.
+    """
+
+    text: str
+    quad_px: QuadPx
+    characters: tuple[CharacterTruth, ...]
+    visible_fraction: float
+    height_px: float
+    stroke_px: float
+    readable: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TextTruth:
+    """A line of text in one image.
+
+    Attributes:
+        text: The line; empty for strokes that only look like writing.
+        language: ISO 639-1 code; ``zxx`` for numbers and codes, ``und`` for invented names, ``mul``
+            for several languages.
+        kind: ``print``; ``scribble`` for strokes that only look like writing; ``code`` for a
+            two-dimensional code, whose only word and character is its content.
+        quad_px: Corners of its ink; they may lie outside the image.
+        body: Name of the body that it is on.
+        instance_id: Its instance; 0 = background.
+        visible_fraction: Visible share of its characters' quads, inside and outside the image.
+        complete: Whether the surface has all characters of the texture's line.
+        words: In reading order.
+    """
+
+    text: str
+    language: str
+    kind: Kind
+    quad_px: QuadPx
+    body: str
+    instance_id: int
+    visible_fraction: float
+    complete: bool
+    words: tuple[WordTruth, ...]
+
+
 Predicate = Literal[
     "on",
     "inside",
@@ -251,6 +323,7 @@ class ImageTruth:
         free_space: Pixels that show ground on which one may drive and nothing stands (free_space).
         relations: Among the instances that the image shows, in order (relations).
         utterances: Captions, expressions and questions (language).
+        texts: Lines of text, in the order of the scene's bodies (text).
         extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
@@ -260,6 +333,7 @@ class ImageTruth:
     free_space: MaskPx | None = None
     relations: tuple[Relation, ...] | None = None
     utterances: tuple[Utterance, ...] | None = None
+    texts: tuple[TextTruth, ...] | None = field(default=None, metadata=_SPARSE)
     extra: Mapping[str, object] = field(default_factory=dict)
 
 

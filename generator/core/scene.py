@@ -577,6 +577,7 @@ class Camera:
         T_rig_camera: Pose on the rig.
         shutter: Exposure of its rows around the scene's instant.
         layers: Surfaces along each ray in channels of layers; 0 = as many as usual.
+        T_sensor_reported: Pose that its calibration states, in its true frame; None = the true one.
     """
 
     name: str
@@ -587,6 +588,7 @@ class Camera:
     T_rig_camera: SE3 = IDENTITY
     shutter: Shutter = INSTANT
     layers: int = field(default=0, metadata={serialization.SPARSE: True})
+    T_sensor_reported: SE3 | None = field(default=None, metadata={serialization.SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)
@@ -603,6 +605,7 @@ class Lidar:
         rig: Name of its rig; empty = it is mounted at ``camera``.
         sweep_s: Duration of a sweep; the scene's instant is its middle.
         origins: Whether its scans have ``capture.ORIGIN`` records.
+        T_sensor_reported: Pose that its calibration states, in its true frame; None = the true one.
     """
 
     name: str
@@ -613,6 +616,7 @@ class Lidar:
     rig: str = ""
     sweep_s: float = 0.0
     origins: bool = field(default=False, metadata={serialization.SPARSE: True})
+    T_sensor_reported: SE3 | None = field(default=None, metadata={serialization.SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)
@@ -627,6 +631,7 @@ class Device:
         T_world_device: Pose, derived from the rig's.
         model: Name of the device in labels.
         camera: Name of the camera it is mounted at; empty = none.
+        T_sensor_reported: Pose that its calibration states, in its true frame; None = the true one.
     """
 
     name: str
@@ -636,6 +641,7 @@ class Device:
     T_world_device: SE3 = IDENTITY
     model: str = ""
     camera: str = ""
+    T_sensor_reported: SE3 | None = field(default=None, metadata={serialization.SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,8 +89,14 @@ class SE3:
 
     def rounded(self, decimals: int = 6) -> SE3:
         """The same pose on a decimal grid, re-normalised: what crosses from physics to labels."""
-        x, y, z = (round(v, decimals) + 0.0 for v in self.translation_m)
-        return SE3((x, y, z), _normalised([round(v, decimals + 2) for v in self.quaternion_wxyz]))
+        tx, ty, tz = self.translation_m
+        w, x, y, z = self.quaternion_wxyz
+        fine = decimals + 2
+        # Number by number, as all of this class: a scene composes and rounds thousands of poses.
+        return SE3(
+            (round(tx, decimals) + 0.0, round(ty, decimals) + 0.0, round(tz, decimals) + 0.0),
+            _normalised(round(w, fine), round(x, fine), round(y, fine), round(z, fine)),
+        )
 
 
 IDENTITY = SE3()
@@ -113,12 +119,10 @@ def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     return _normalised(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ]
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
     )
 
 
@@ -160,7 +164,7 @@ def rotation_to_quaternion(rotation: Array) -> Quaternion:
         q[1 + i] = 1 + m[i][i] - m[j][j] - m[l][l]
         q[1 + j] = m[j][i] + m[i][j]
         q[1 + l] = m[l][i] + m[i][l]
-    return _normalised(q if q[0] >= 0 else [-v for v in q])
+    return _normalised(*(q if q[0] >= 0 else [-v for v in q]))
 
 
 def turned(origin_m: Vec3, yaw_rad: float, pitch_rad: float, roll_rad: float) -> SE3:
@@ -212,6 +216,6 @@ def look_at(eye_m: Vec3, target_m: Vec3, roll_rad: float = 0.0) -> SE3:
     return SE3.from_rotation(np.stack(columns, axis=1), eye_m)
 
 
-def _normalised(q: list[float]) -> Quaternion:
-    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    return (q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm)
+def _normalised(w: float, x: float, y: float, z: float) -> Quaternion:
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    return (w / norm, x / norm, y / norm, z / norm)

@@ -4,7 +4,8 @@ A body that changes its mesh, such as a person who walks, carries its points alo
 have the same triangles; otherwise they keep their places in the body's frame.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +14,13 @@ from numpy.typing import NDArray
 from gen_data.core import se3
 from gen_data.core.asset_types import MeshData
 from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.scene import Scene
+from gen_data.core.scene import Body, Scene
 
 Rows = NDArray[np.intp]
 REACH_M = 1e-3
 """Largest distance from a triangle, for points within a metre; grows in proportion to theirs."""
+PAIRS = 1 << 18
+"""Points times triangles that are compared at once."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,6 +82,25 @@ class SurfacePoints:
         turned = np.einsum("nij,nj->ni", R[inverse], p_body, optimize=False)
         return np.asarray(turned + t[inverse])
 
+    def moving(self, scene: Scene, p_body: se3.Array) -> Callable[[se3.Array], se3.Array]:
+        """World coordinates [m] of ``on_bodies``, [n, 3], as a function of delays [s], [n].
+
+        Delays count from the scene's time. Meshes remain as they are then; bodies move.
+        """
+        p_world = self.in_world(scene, p_body)
+        tracks = {track.body: track for track in scene.tracks}
+        bodies = ((tracks.get(scene.bodies[k].name), rows) for k, rows in self.by_body())
+        movers = [(track, rows) for track, rows in bodies if track is not None]
+
+        def places(delays_s: se3.Array) -> se3.Array:
+            found = p_world.copy()
+            for track, rows in movers:
+                R, t = track.poses(scene.time_s + delays_s[rows])
+                found[rows] = np.einsum("nij,nj->ni", R, p_body[rows], optimize=False) + t
+            return np.asarray(found)
+
+        return places
+
 
 def find_surface_points(
     scene: Scene,
@@ -108,8 +130,11 @@ def find_surface_points(
         rows = wanted.get(item.instance_id)
         if rows is None:
             continue
-        p = item.T_world_body.inverse().apply(p_world[rows]) / item.scale
         low, high = assets.bounds_m(item.asset)
+        rows = rows[_are_around(item, low, high, p_world[rows], reach_m)]
+        if not len(rows):
+            continue
+        p = item.T_world_body.inverse().apply(p_world[rows]) / item.scale
         near = ((p >= np.subtract(low, reach_m)) & (p <= np.add(high, reach_m))).all(axis=1)
         if not near.any():
             continue
@@ -127,6 +152,18 @@ def find_surface_points(
     return points, kept
 
 
+def _are_around(
+    body: Body, low: se3.Vec3, high: se3.Vec3, p_world: se3.Array, reach_m: float
+) -> NDArray[np.bool_]:
+    """Whether places are in the ball around a body's bounds, or near it: a quick test."""
+    x, y, z = (0.5 * body.scale * (a + b) for a, b in zip(low, high, strict=True))
+    pose = body.T_world_body
+    turned = se3.rotate_by_quaternion(pose.quaternion_wxyz, (x, y, z))
+    away = p_world - np.add(turned, pose.translation_m)
+    radius_m = body.scale * (0.5 * math.dist(low, high) + 2.0 * reach_m) + REACH_M
+    return np.asarray((away * away).sum(axis=1) < radius_m**2)
+
+
 def _nearest_triangles(
     mesh: MeshData, p_mesh: se3.Array, reach_m: float
 ) -> tuple[se3.Array, Rows, se3.Array, se3.Array]:
@@ -137,33 +174,41 @@ def _nearest_triangles(
     n = len(p_mesh)
     distance_m, face = np.full(n, np.inf), np.zeros(n, np.intp)
     weights, places = np.zeros((n, 3)), np.zeros((n, 3))
-    x = np.ascontiguousarray(mesh.vertices_m[:, 0])[mesh.faces.T]
-    low, high = x.min(axis=0), x.max(axis=0)
-    for k, p in enumerate(p_mesh):
-        around_m = reach_m * max(1.0, 0.1 * float(np.abs(p).max()))
-        near = np.flatnonzero((low <= p[0] + around_m) & (high >= p[0] - around_m))
-        triangles = mesh.vertices_m[mesh.faces[near]]
+    around_m = reach_m * np.maximum(1.0, 0.1 * np.abs(p_mesh).max(axis=1))
+    lows, highs = p_mesh - around_m[:, None], p_mesh + around_m[:, None]
+    x = np.take(mesh.vertices_m[:, 0].copy(), mesh.faces)
+    low, high = (
+        choose(choose(x[:, 0], x[:, 1]), x[:, 2]).astype(np.float64)
+        for choose in (np.minimum, np.maximum)
+    )
+    step = max(1, PAIRS // max(1, len(low)))
+    for start in range(0, n, step):
+        own = slice(start, start + step)
+        point, near = np.nonzero((low <= highs[own, :1]) & (high >= lows[own, :1]))
+        point += start
         for axis in (1, 2):
-            side = triangles[:, :, axis]
-            inside = (side.min(axis=1) <= p[axis] + around_m) & (
-                side.max(axis=1) >= p[axis] - around_m
-            )
-            near, triangles = near[inside], triangles[inside]
-        if not len(near):
+            side = mesh.vertices_m[mesh.faces[near].T, axis]
+            inside = side.min(axis=0) <= highs[point, axis]
+            inside &= side.max(axis=0) >= lows[point, axis]
+            point, near = point[inside], near[inside]
+        if not len(point):
             continue
-        corners = triangles.astype(np.float64)
+        corners = mesh.vertices_m[mesh.faces[near]].astype(np.float64)
+        p = p_mesh[point]
         shares = _barycentric(corners, p)
         found = np.einsum("nk,nki->ni", shares, corners, optimize=False)
         away = np.sqrt(((found - p) ** 2).sum(axis=1))
-        best = int(away.argmin())
-        if away[best] <= 2.0 * around_m:
-            distance_m[k], face[k] = away[best], near[best]
-            weights[k], places[k] = shares[best], found[best]
+        order = np.lexsort((away, point))
+        best = order[np.flatnonzero(np.diff(point[order], prepend=-1))]
+        best = best[away[best] <= 2.0 * around_m[point[best]]]
+        rows = point[best]
+        distance_m[rows], face[rows] = away[best], near[best]
+        weights[rows], places[rows] = shares[best], found[best]
     return distance_m, face, weights, places
 
 
 def _barycentric(triangles: se3.Array, p: se3.Array) -> se3.Array:
-    """Weights [n, 3] of a point's projections on triangles [n, 3, 3], clipped to them."""
+    """Weights [n, 3] of projections of points [n, 3] on triangles [n, 3, 3], clipped to them."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     u, v, w = b - a, c - a, p - a
     uu, uv, vv = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)

@@ -24,7 +24,13 @@ from gen_data.core.interfaces import (
 )
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Camera, Device, Lidar, Scene
-from gen_data.exporters.base import ExporterBase, Rectify, check_image_formats, select_names
+from gen_data.exporters.base import (
+    ExporterBase,
+    Rectify,
+    check_delivery,
+    check_image_formats,
+    select_names,
+)
 from gen_data.exporters.image_files import encode_channel, link_or_copy, read_image
 from gen_data.pipeline.rectification import (
     NOTHING,
@@ -102,7 +108,8 @@ class ExporterView:
         """
         seen = self.info(info)
         check_image_formats(self, seen)
-        if self.rectify and "language" in self.exporter.needs:
+        check_delivery(getattr(self.exporter, "exporter", self.exporter), seen)
+        if self.rectify and {"language", "text"} & self.exporter.needs:
             raise ConfigError(
                 f"{self._place}: rectify: its texts are about the images as they are; "
                 "expected a camera with a pinhole"

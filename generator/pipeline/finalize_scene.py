@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 
 from gen_data.core import asset_types, scene_time
+from gen_data.core.bounded_cache import CountCache, ObjectCache
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.scene import PERSON_MARGIN_M, Body, Box3dExtent, Instance, Scene
 from gen_data.core.se3 import SE3, Array, Vec3
 
 PEOPLE = frozenset({"person", "pedestrian"})
+_measured: ObjectCache[CountCache[dict[str, Any]]] = ObjectCache(1)
+"""``_own_measures`` of the latest library: streets stand full of equal things."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,19 +95,11 @@ def _measure(
     """Frame, box and keypoints of an instance that consists of these bodies."""
     if T_world_base is None and len(bodies) == 1:
         body = bodies[0]
-        low, high = assets.bounds_m(body.asset)
-        return {
-            "T_world_instance": body.T_world_body,
-            "box_min_m": _scale(low, body.scale),
-            "box_max_m": _scale(high, body.scale),
-            "body_bounds_m": _labelled_bounds(body, assets, box3d),
-            "keypoints": tuple(
-                asset_types.Keypoint(
-                    point.name, _scale(point.position_m, body.scale), point.radius_m * body.scale
-                )
-                for point in assets.keypoints(body.asset)
-            ),
-        }
+        known = _measured.get(assets, lambda: CountCache(2048))
+        own = known.get(
+            f"{body.asset} {body.scale!r} {box3d}", lambda: _own_measures(body, assets, box3d)
+        )
+        return {"T_world_instance": body.T_world_body, **own}
     T_world_instance = bodies[0].T_world_body if T_world_base is None else T_world_base
     T_instance_world = T_world_instance.inverse()
     lows, highs = [], []
@@ -117,6 +112,22 @@ def _measure(
         "T_world_instance": T_world_instance,
         "box_min_m": _round_to_micrometre(np.min(lows, axis=0)),
         "box_max_m": _round_to_micrometre(np.max(highs, axis=0)),
+    }
+
+
+def _own_measures(body: Body, assets: AssetLibrary, box3d: Box3dExtent) -> dict[str, Any]:
+    """Boxes and keypoints of an instance of a single body, in its frame, wherever it is."""
+    low, high = assets.bounds_m(body.asset)
+    return {
+        "box_min_m": _scale(low, body.scale),
+        "box_max_m": _scale(high, body.scale),
+        "body_bounds_m": _labelled_bounds(body, assets, box3d),
+        "keypoints": tuple(
+            asset_types.Keypoint(
+                point.name, _scale(point.position_m, body.scale), point.radius_m * body.scale
+            )
+            for point in assets.keypoints(body.asset)
+        ),
     }
 
 

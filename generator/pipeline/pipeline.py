@@ -19,6 +19,7 @@ from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline
 from gen_data.pipeline.numerics import numerics_digests
 from gen_data.pipeline.scene_stages import finish_settled, finish_view
+from gen_data.sensors.sensor_faults import deliver, with_calibrations
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -205,7 +206,8 @@ class Pipeline:
         """
         timings = dict(timings_s or {})
         with _timed(timings, "randomize"):
-            timeline = Timeline(view.scene, self.assets, self._category_ids)
+            begun = with_calibrations(view.scene, sensors, view.streams)
+            timeline = Timeline(begun, self.assets, self._category_ids)
             time_s = step_index * self.info.step_s
             scene = timeline.at(time_s)
             streams = replace(view.streams, step=step_index)
@@ -253,6 +255,7 @@ class Pipeline:
             scene = timeline.at(time_s + self._offsets_s[sensor.name])
             with _timed(timings_s, "render"):
                 seen = sensor.capture(scene, self.renderer, self.config.channels, rng)
+                seen = deliver(sensor, seen, rng)
             if isinstance(seen, PointCloud):
                 clouds[sensor.name] = seen
             elif isinstance(seen, Measurements):

@@ -286,8 +286,9 @@ def rectified_truth(
         parts: Rectified part ids [height, width]; None = not known, then ``part_px`` is None.
 
     Returns:
-        The annotations without those that the original image alone supports: texts
-        (``utterances``). Results of third-party annotators (``extra``) are those of the original.
+        The annotations without those that the original image alone supports: sentences
+        (``utterances``) and written text (``texts``). Results of third-party annotators
+        (``extra``) are those of the original.
     """
     camera = replace(truth.camera, intrinsics=bent.target)
     masks = {t.instance.instance_id: bent.mask(t.mask) for t in truth.objects if t.mask is not None}
@@ -333,6 +334,7 @@ def rectified_truth(
         else _clipped(bent.mask(truth.free_space), bent),
         relations=relations,
         utterances=None,
+        texts=None,
     )
 
 
@@ -437,10 +439,7 @@ def _borders(borders: Sequence[BorderTruth], bent: Rectification) -> tuple[Borde
     cut = []
     for border in borders:
         places = bent.points(np.array(border.points_px))
-        for start, end in lanes.runs(bent.shows(places)):
-            if end - start >= 2:
-                points = tuple(
-                    (round(float(u), 2), round(float(v), 2)) for u, v in places[start:end]
-                )
-                cut.append(replace(border, points_px=points, visible=border.visible[start:end]))
+        for start, end in lanes.runs(np.flatnonzero(bent.shows(places))):
+            points = tuple((round(float(u), 2), round(float(v), 2)) for u, v in places[start:end])
+            cut.append(replace(border, points_px=points, visible=border.visible[start:end]))
     return tuple(cut)

@@ -14,6 +14,7 @@ from gen_data.core.sample import Sample, SensorTracks
 from gen_data.preview.lane_view import draw_borders
 from gen_data.preview.overlay import Image, channel_image, draw_labels, draw_tracks, layer_images
 from gen_data.preview.sensor_views import range_view, top_view
+from gen_data.preview.text_view import draw_texts
 from gen_data.preview.voxel_view import oblique_view
 from gen_data.sensors.lidar import pseudo_lidar
 
@@ -64,6 +65,7 @@ def make_tiles(
                     unit = reading.camera.intrinsics.width_px / width_px if width_px else 1.0
                     image = draw_labels(reading, sample.truth[name], unit)
                     draw_borders(image, sample.truth[name].borders or (), unit)
+                    draw_texts(image, sample.truth[name].texts or (), unit)
                     if name in ways.seen:
                         draw_tracks(image, ways.seen[name], unit)
                     yield Tile(caption, image)

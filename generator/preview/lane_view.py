@@ -1,41 +1,16 @@
 """Borders of lanes in pictures: coloured by kind, darker where something hides them."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby, pairwise
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
 
 from gen_data.core.sample import BorderTruth
+from gen_data.exporters.label_parts import border_color, split_border
 from gen_data.preview.overlay import Image
-from gen_data.preview.palette import Rgb
 
-COLORS: Mapping[str, Rgb] = {"lane": (0, 225, 255), "road": (255, 210, 0), "edge": (255, 70, 70)}
-"""By kind: between lanes of one direction, between directions, edges of the carriageway."""
-HIDDEN = 0.5
-"""Brightness of hidden parts."""
 _SHIFT = 4
 """Fractional bits of OpenCV's drawing coordinates; its pixel centres are integers."""
-
-Points = tuple[tuple[float, float], ...]
-
-
-def border_color(kind: str, *, visible: bool = True) -> Rgb:
-    """SRGB colour of a border; darker for a hidden part."""
-    red, green, blue = COLORS[kind]
-    share = 1.0 if visible else HIDDEN
-    return (round(share * red), round(share * green), round(share * blue))
-
-
-def split_border(border: BorderTruth) -> Iterator[tuple[bool, Points]]:
-    """Visible and hidden parts of a border in an image, in order; they share their ends.
-
-    A part is visible where all of its points are.
-    """
-    steps = zip(pairwise(border.visible), pairwise(border.points_px), strict=True)
-    for seen, part in groupby(steps, key=lambda step: all(step[0])):
-        ends = [points for _, points in part]
-        yield seen, (ends[0][0], *(end for _, end in ends))
 
 
 def draw_borders(image: Image, borders: Sequence[BorderTruth], unit: float = 1.0) -> None:

@@ -1,29 +1,7 @@
-"""Colour maps for ids, depth, flow and fractions; ids have the same colour in every image."""
-
-import colorsys
+"""Colour maps for depth, positions, flow and fractions."""
 
 import numpy as np
 from numpy.typing import NDArray
-
-Rgb = tuple[int, int, int]
-GOLDEN_RATIO_CONJUGATE = 0.618033988749895
-"""Step around the hue circle that keeps the hues of successive ids far apart."""
-
-
-def id_color(number: int) -> Rgb:
-    """SRGB colour of an id; black for 0."""
-    if number == 0:
-        return (0, 0, 0)
-    hue = (number * GOLDEN_RATIO_CONJUGATE) % 1.0
-    red, green, blue = colorsys.hsv_to_rgb(hue, 0.62 + 0.3 * (number % 2), 0.98)
-    return (round(255 * red), round(255 * green), round(255 * blue))
-
-
-def color_ids(ids: NDArray[np.integer]) -> NDArray[np.uint8]:
-    """Colour an id image [h, w], uint8 [h, w, 3]."""
-    table = np.array([id_color(i) for i in range(int(ids.max(initial=0)) + 1)], np.uint8)
-    colored: NDArray[np.uint8] = table[ids]
-    return colored
 
 
 def color_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:

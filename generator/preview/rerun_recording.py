@@ -29,15 +29,17 @@ from gen_data.core.boxes import OrientedBox
 from gen_data.core.capture import LAYERS, Capture, Channel, PointCloud, SensorReading
 from gen_data.core.lane_geometry import LaneBorder
 from gen_data.core.sample import (
-    TRACK_STATES,
     BorderTruth,
     ImageTruth,
     Occupancy,
     Sample,
     SensorTracks,
+    TextTruth,
 )
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.preview import lane_view, overlay, palette, sensor_views, voxel_view
+from gen_data.exporters import label_parts
+from gen_data.exporters.label_colors import id_color
+from gen_data.preview import overlay, sensor_views, text_view
 
 TIMELINE = "sample"
 TIME = "time"
@@ -56,8 +58,6 @@ TARGET_M = 2.0
 """Distance from there of the point that the view turns around."""
 WAY_M = 0.1
 """Shortest trajectory to show."""
-LIFT_M = 0.05
-"""Height of trajectories above the path of a body's origin, and of lanes above the ground."""
 
 
 @dataclass
@@ -89,13 +89,13 @@ class Recorder:
         background = rr.AnnotationInfo(id=0, label="background", color=(60, 60, 60))
         described = [rr.ClassDescription(info=background)]
         for k, name in enumerate(self.info.categories, 1):
-            info = rr.AnnotationInfo(id=k, label=name, color=palette.id_color(k))
+            info = rr.AnnotationInfo(id=k, label=name, color=id_color(k))
             skeleton = self._skeletons.get(k, skeletons.Skeleton(()))
             described.append(
                 rr.ClassDescription(
                     info=info,
                     keypoint_annotations=[
-                        rr.AnnotationInfo(id=i, label=label, color=palette.id_color(k))
+                        rr.AnnotationInfo(id=i, label=label, color=id_color(k))
                         for i, label in enumerate(skeleton.names)
                     ],
                     keypoint_connections=skeleton.bones,
@@ -135,7 +135,8 @@ class Recorder:
             self.stream.log("world/lanes", lane_strips_3d(borders))
         tracks = None if sample.frame is None else sample.frame.tracks
         if tracks is not None:
-            places = rr.Points3D(tracks.position_m, colors=point_colors(len(tracks.position_m)))
+            colors = label_parts.track_colors(len(tracks.position_m))
+            places = rr.Points3D(tracks.position_m, colors=colors)
             self.stream.log("world/tracks", places)
         for name, reading in sorted(sample.capture.readings.items()):
             self._set_time(sample, reading.time_s)
@@ -150,10 +151,7 @@ class Recorder:
 
     def _record_faults(self, capture: Capture) -> None:
         """Log the true faults of all readings that have some, as text."""
-        faults = {name: reading.faults for name, reading in capture.readings.items()}
-        faults |= {name: cloud.faults for name, cloud in capture.clouds.items()}
-        faults |= {name: table.faults for name, table in capture.tables.items()}
-        for name, found in sorted(faults.items()):
+        for name, found in capture.faults():
             if found:
                 text = serialization.canonical_json(found)
                 self.stream.log(f"faults/{name}", rr.TextDocument(text))
@@ -192,7 +190,7 @@ class Recorder:
 
     def _record_voxels(self, grid: Occupancy, scene: Scene) -> None:
         """Log voxels with a surface as boxes that touch."""
-        centers_m, colors = voxel_view.surface_voxels(grid, scene)
+        centers_m, colors = label_parts.surface_voxels(grid, label_parts.categories_of(scene))
         self.stream.log("world/occupancy", transform(grid.T_world_frame))
         half_m = np.full_like(centers_m, 0.5 * grid.voxel_m)
         solid = rr.components.FillMode.Solid
@@ -247,6 +245,8 @@ class Recorder:
         self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
         if truth.borders is not None:
             self.stream.log(f"{path}/image/lanes", lane_strips_2d(truth.borders))
+        if truth.texts is not None:
+            self.stream.log(f"{path}/image/texts", text_strips(truth.texts))
         self._record_keypoints(f"{path}/image/keypoints", truth)
 
     def _record_keypoints(self, path: str, truth: ImageTruth) -> None:
@@ -378,19 +378,14 @@ def pinhole(camera: intrinsics.Intrinsics) -> rr.Pinhole:
     )
 
 
-def point_colors(count: int) -> list[palette.Rgb]:
-    """Colours by which tracked points are known in all views."""
-    return [palette.id_color(k + 1) for k in range(count)]
-
-
 def tracked_points(tracks: SensorTracks) -> rr.Points2D:
     """Convert the tracked points inside an image; hidden ones are smaller."""
-    shown = np.flatnonzero(tracks.state < TRACK_STATES.index("outside"))
-    colors = point_colors(len(tracks.state))
+    shown = label_parts.inside_image(tracks)
+    colors = label_parts.track_colors(len(tracks.state))
     return rr.Points2D(
         tracks.image_px[shown],
         colors=[colors[k] for k in shown.tolist()],
-        radii=np.where(tracks.visible[shown], -3.0, -1.5),
+        radii=np.where(tracks.visible[shown], *label_parts.TRACK_RADII[::-1]),
         keypoint_ids=shown,
         show_labels=False,
     )
@@ -440,25 +435,37 @@ def boxes_2d(truth: ImageTruth) -> rr.Boxes2D:
 def lane_strips_3d(borders: Sequence[LaneBorder]) -> rr.LineStrips3D:
     """Convert borders of lanes in the world, coloured by kind."""
     return rr.LineStrips3D(
-        [np.add(border.points_m, (0.0, 0.0, LIFT_M)) for border in borders],
-        colors=[lane_view.border_color(border.kind) for border in borders],
+        [np.add(border.points_m, (0.0, 0.0, label_parts.LIFT_M)) for border in borders],
+        colors=[label_parts.border_color(border.kind) for border in borders],
         radii=rr.Radius.ui_points(1.0),
     )
 
 
 def lane_strips_2d(borders: Sequence[BorderTruth]) -> rr.LineStrips2D:
     """Convert borders of lanes in an image; hidden parts are darker and thinner."""
-    parts = [(b.kind, seen, line) for b in borders for seen, line in lane_view.split_border(b)]
+    parts = [(b.kind, seen, line) for b in borders for seen, line in label_parts.split_border(b)]
     return rr.LineStrips2D(
         [line for _, _, line in parts],
-        colors=[lane_view.border_color(kind, visible=seen) for kind, seen, _ in parts],
-        radii=[-1.5 if seen else -0.75 for _, seen, _ in parts],
+        colors=[label_parts.border_color(kind, visible=seen) for kind, seen, _ in parts],
+        radii=[label_parts.BORDER_RADII[seen] for _, seen, _ in parts],
+    )
+
+
+def text_strips(texts: Sequence[TextTruth]) -> rr.LineStrips2D:
+    """Convert words in an image: outlines with the text, in the colours of ``text_view``."""
+    words = [word for text in texts for word in text.words if word.visible_fraction > 0.0]
+    return rr.LineStrips2D(
+        [[*word.quad_px, word.quad_px[0]] for word in words],
+        colors=[text_view.word_color(word) for word in words],
+        labels=[word.text for word in words],
+        show_labels=False,
+        radii=-1.0,
     )
 
 
 def trajectory_strips(scene: Scene, until_s: float) -> rr.LineStrips3D:
     """Trajectories of bodies from now to an instant, coloured by category; rigs in white."""
-    categories = {i.instance_id: i.category_id for i in scene.instances}
+    categories = label_parts.categories_of(scene)
     carriers = {rig.body for rig in scene.rigs}
     strips, colors = [], []
     for track in scene.tracks:
@@ -468,9 +475,9 @@ def trajectory_strips(scene: Scene, until_s: float) -> rr.LineStrips3D:
         if float(np.ptp(places_m, axis=0).max()) < WAY_M:
             continue
         category_id = categories.get(scene.body(track.body).instance_id, 0)
-        strips.append(np.add(places_m, (0.0, 0.0, LIFT_M)))
+        strips.append(np.add(places_m, (0.0, 0.0, label_parts.LIFT_M)))
         carries = track.body in carriers or not category_id
-        colors.append((255, 255, 255) if carries else palette.id_color(category_id))
+        colors.append((255, 255, 255) if carries else id_color(category_id))
     return rr.LineStrips3D(strips, colors=colors, radii=rr.Radius.ui_points(1.5))
 
 

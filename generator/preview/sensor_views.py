@@ -1,18 +1,16 @@
 """Views of laser scans, radars and event cameras."""
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Literal, get_args
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from gen_data.core import asset_types, boxes, capture, se3
 from gen_data.core.scene import Scene
+from gen_data.exporters.label_colors import SURFACE_COLORS, UNLABELLED, id_color
 from gen_data.preview.overlay import BOX_EDGES, Image
-from gen_data.preview.palette import color_shares, id_color
+from gen_data.preview.palette import color_shares
 
 PointColors = Literal["class", "intensity"]
 """Property that determines the colour of a point."""
@@ -31,12 +29,6 @@ DOT_PX = 6
 GREY = 40
 BRIGHTER, DARKER = (90, 170, 255), (255, 90, 70)
 
-UNLABELLED = (120, 120, 120)
-COLORS: Mapping[str, Sequence[int]] = yaml.safe_load(
-    Path(__file__).with_name("surface_colors.yaml").read_text(encoding="utf-8")
-)
-"""Colours of points without a category, by surface."""
-
 
 def point_colors(cloud: capture.PointCloud, by: PointColors = "class") -> NDArray[np.uint8]:
     """SRGB colour of each point, uint8 [n, 3].
@@ -51,7 +43,7 @@ def point_colors(cloud: capture.PointCloud, by: PointColors = "class") -> NDArra
         return color_shares(np.sqrt(points["intensity"]))
     categories = points["category_id"]
     of_category = [id_color(k) for k in range(int(categories.max(initial=0)) + 1)]
-    of_surface = [COLORS.get(name, UNLABELLED) for name in asset_types.SURFACES]
+    of_surface = [SURFACE_COLORS.get(name, UNLABELLED) for name in asset_types.SURFACES]
     colors: NDArray[np.uint8] = np.array(of_surface, np.uint8)[points["surface"]]
     labelled = categories > 0
     colors[labelled] = np.array(of_category, np.uint8)[categories[labelled]]

@@ -1,14 +1,12 @@
 """Views of occupancy: voxels with a surface, coloured by category, else by surface."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gen_data.core import asset_types, se3
 from gen_data.core.sample import VOXEL_STATES, Occupancy
 from gen_data.core.scene import Scene
+from gen_data.exporters.label_parts import categories_of, surface_voxels, voxel_colors
 from gen_data.preview.overlay import Image
-from gen_data.preview.palette import id_color
-from gen_data.preview.sensor_views import COLORS, UNLABELLED, empty_view
+from gen_data.preview.sensor_views import empty_view
 
 DOWN, AROUND = np.radians(40.0), np.radians(-70.0)
 """Pitch of the view, and its direction over the ground, from X: from behind, from the left."""
@@ -20,30 +18,33 @@ UNSEEN = 0.35
 """Brightness of voxels that no sensor observes."""
 
 
-def voxel_colors(grid: Occupancy, scene: Scene) -> NDArray[np.uint8]:
-    """SRGB colour of every voxel, uint8 [x, y, z, 3]."""
-    top = max((i.instance_id for i in scene.instances), default=0)
-    of_instance = np.zeros((top + 1, 3), np.uint8)
-    for instance in scene.instances:
-        of_instance[instance.instance_id] = id_color(instance.category_id)
-    of_surface = [COLORS.get(name, UNLABELLED) for name in asset_types.SURFACES]
-    colors: NDArray[np.uint8] = np.array(of_surface, np.uint8)[grid.surface]
-    labelled = (grid.instance_id > 0) & (of_instance[grid.instance_id].any(axis=-1))
-    colors[labelled] = of_instance[grid.instance_id[labelled]]
-    return colors
+def view_from_above(grid: Occupancy, scene: Scene) -> Image:
+    """Draw a pixel per column of voxels, uint8 [x, y, 3]: X upwards, Y to the left.
 
-
-def surface_voxels(grid: Occupancy, scene: Scene) -> tuple[se3.Array, NDArray[np.uint8]]:
-    """Centres in the frame [m], [n, 3], and colours, uint8 [n, 3], of voxels with a surface."""
-    shown = grid.state == VOXEL_STATES.index("surface")
-    return grid.centers_m(np.argwhere(shown)), voxel_colors(grid, scene)[shown]
+    It has the colour of the highest surface that a sensor observes below air that it observes:
+    below ceilings, too. Elsewhere it is dark: the highest surface; black without any.
+    """
+    surface = grid.state == VOXEL_STATES.index("surface")
+    # Without a sensor, none is dark.
+    seen = np.logical_or.reduce([*grid.observed.values()] or [np.ones(surface.shape, np.bool_)])
+    air = seen & (grid.state == VOXEL_STATES.index("free"))
+    above = np.concatenate([air[..., 1:], np.ones_like(air[..., :1])], axis=2)
+    chosen = surface & seen & above
+    bright = chosen.any(axis=2)
+    chosen[~bright] = surface[~bright]
+    top = chosen.shape[2] - 1 - chosen[..., ::-1].argmax(axis=2)
+    x, y = np.indices(top.shape)
+    shade = np.where(bright, 1.0, UNSEEN)[..., None]
+    colors = voxel_colors(grid, categories_of(scene))[x, y, top] * shade
+    colors[~chosen.any(axis=2)] = 0
+    return np.ascontiguousarray(colors.astype(np.uint8)[::-1, ::-1])
 
 
 def oblique_view(grid: Occupancy, scene: Scene) -> Image:
     """Draw voxels with a surface from behind and above, uint8 [h, w, 3]; unobserved ones dark."""
     image = empty_view(ASPECT)
     height, width = image.shape[:2]
-    centers, colors = surface_voxels(grid, scene)
+    centers, colors = surface_voxels(grid, categories_of(scene))
     if not len(centers):
         return image
     shown = grid.state == VOXEL_STATES.index("surface")

@@ -446,7 +446,8 @@ function licences() {
 // ---------------------------------------------------------------- sample browser
 
 const LAYERS = [["boxes", "2D boxes"], ["masks", "Masks"], ["keypoints", "Keypoints"],
-  ["boxes3d", "3D boxes"], ["points", "LiDAR"], ["depth", "Depth"], ["names", "Names"]];
+  ["boxes3d", "3D boxes"], ["points", "LiDAR"], ["depth", "Depth"], ["names", "Names"],
+  ["lanes", "Lanes"], ["tracks", "Tracks"]];
 
 const NAMED_PX = 26;
 
@@ -460,7 +461,7 @@ function hasLayer(image, layer) {
   const any = (field) => image.objects.some((item) => item[field]);
   return { boxes: () => any("box"), masks: () => Boolean(image.pictures.masks), keypoints: () => any("keypoints"),
     boxes3d: () => any("edges"), points: () => Boolean(image.points), depth: () => Boolean(image.pictures.depth),
-    names: () => any("box") }[layer]();
+    names: () => any("box"), lanes: () => Boolean(image.lanes), tracks: () => Boolean(image.tracks) }[layer]();
 }
 
 const loaded = new Map();
@@ -509,6 +510,8 @@ function browser() {
   const canvas = el("canvas", { tabindex: 0, role: "img", "aria-label": "Image with its labels" });
   const message = el("p", { hidden: "" }, "No image has an object that passes the filters.");
   const list = el("div", { class: "card objects" });
+  const above = el("figure", { class: "card figure above", hidden: "" });
+  const layered = el("figure", { class: "card figure layered", hidden: "" });
   const strip = el("div", { class: "strip" });
   const title = el("span", { class: "quiet", id: "shown" });
   const names = () => (state.set.categories || []).map((row) => row.name);
@@ -536,6 +539,7 @@ function browser() {
     if (!image) {
       title.textContent = "0 images";
       list.replaceChildren();
+      above.hidden = layered.hidden = true;
       return;
     }
     const depth = state.layers.has("depth") && image.pictures.depth;
@@ -567,6 +571,8 @@ function browser() {
     // Lines keep their width on the screen.
     const thin = width / wide;
     if (state.layers.has("points") && image.points) paintPoints(context, image.points, thin);
+    if (state.layers.has("lanes")) paintLanes(context, image.lanes || [], thin);
+    if (state.layers.has("tracks")) paintTracks(context, image.tracks || [], thin);
     for (const k of shown) paintObject(context, image.objects[k], thin, k === state.picked);
   }
 
@@ -613,6 +619,30 @@ function browser() {
     }
   }
 
+  /** Hidden parts are thin and dark, as hidden points are rings. */
+  function paintLanes(context, lanes, thin) {
+    for (const [color, visible, line] of lanes) {
+      context.strokeStyle = color;
+      context.globalAlpha = visible ? 1 : 0.5;
+      context.lineWidth = (visible ? 2.4 : 1.2) * thin;
+      context.beginPath();
+      for (let p = 0; p < line.length; p += 2) context.lineTo(line[p], line[p + 1]);
+      context.stroke();
+    }
+    context.globalAlpha = 1;
+  }
+
+  function paintTracks(context, tracks, thin) {
+    for (const [color, visible, u, v] of tracks) {
+      context.strokeStyle = context.fillStyle = color;
+      context.lineWidth = 1.4 * thin;
+      context.beginPath();
+      context.arc(u, v, 3 * thin, 0, 7);
+      if (visible) context.fill();
+      else context.stroke();
+    }
+  }
+
   function paintPoints(context, packed, thin) {
     const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
     const values = new Uint16Array(bytes.buffer);
@@ -635,6 +665,25 @@ function browser() {
       { picked: (row) => { state.picked = shown[row].k; draw(); } }));
   }
 
+  function showFigures() {
+    const { occupancy, layers, pictures } = visible()[state.position] || { pictures: {} };
+    layered.hidden = !pictures.layers;
+    if (pictures.layers) {
+      layered.replaceChildren(el("img", { src: pictures.layers, alt: "Layers and mirrors" }),
+        el("figcaption", { class: "quiet" }, `From top to bottom: ${layers.join(", ")}, from the first surface on.`));
+    }
+    above.hidden = !pictures.occupancy;
+    if (above.hidden) return;
+    const { shape, sensors } = occupancy;
+    const seen = occupancy.observed_surface / Math.max(1, occupancy.surface);
+    const text = `Occupancy from above, X upwards: ${shape.join(" × ")} voxels of ${occupancy.voxel_m} m. `
+      + `${number(occupancy.surface)} with a surface, ${number(occupancy.interior)} within objects and the ground, `
+      + `${number(occupancy.free)} free.`
+      + (sensors.length ? ` ${percent(seen)} of the surfaces observed by ${sensors.join(", ")}; others are dark.` : "");
+    above.replaceChildren(el("img", { src: pictures.occupancy, alt: "Occupancy from above", width: shape[1],
+      height: shape[0] }), el("figcaption", { class: "quiet" }, text));
+  }
+
   function listStrip() {
     const images = visible();
     strip.replaceChildren(...images.map((image, k) => el("button", {
@@ -653,6 +702,7 @@ function browser() {
       strip.scrollLeft = current.offsetLeft - strip.offsetLeft - strip.clientWidth / 2 + current.clientWidth / 2;
     }
     listObjects();
+    showFigures();
     draw();
   }
 
@@ -714,7 +764,8 @@ function browser() {
     el("div", { class: "bar" },
       el("button", { "aria-label": "Previous image", click: () => go(state.position - 1) }, "←"),
       el("button", { "aria-label": "Next image", click: () => go(state.position + 1) }, "→"), title),
-    el("div", { class: "viewer" }, el("div", {}, el("div", { class: "stage" }, canvas, message), strip), list));
+    el("div", { class: "viewer" }, el("div", {}, el("div", { class: "stage" }, canvas, message), strip),
+      el("div", {}, list, above, layered)));
   // The canvas has no width before it is in the page.
   requestAnimationFrame(() => choose(known[0]));
   return whole;

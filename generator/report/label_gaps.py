@@ -59,8 +59,8 @@ def find_label_gaps(stored: StoredSamples) -> LabelGaps:
     """Find what has no label. Reading ends as soon as every sensor has one.
 
     Labels are visible, annotated objects that the label map of the configuration keeps and does not
-    ignore, visible tracked points, and visible borders of lanes. A data set without annotations and
-    exporters has no gaps.
+    ignore, visible tracked points, visible borders of lanes, and text. A data set without
+    annotations and exporters has no gaps.
 
     Raises:
         StorageError: a file is missing or damaged.
@@ -115,7 +115,7 @@ def _has_label(sample: LabelledImages, name: str, applied: AppliedLabelMap) -> b
     if tracks is not None and name in tracks.sensors and tracks.sensors[name].visible.any():
         return True
     truth: ImageTruth = applied.map_image(sample.truth[name])
-    if any(any(border.visible) for border in truth.borders or ()):
+    if truth.texts or any(any(border.visible) for border in truth.borders or ()):
         return True
     return any(
         seen.instance.annotated and seen.visible_px > 0 and not seen.ignored

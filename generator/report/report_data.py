@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.core import capture, errors, interfaces, system_calls
-from gen_data.report import image_statistics, label_checks, report_tables, sample_browser
+from gen_data.report import (
+    image_statistics,
+    label_checks,
+    occupancy_statistics,
+    report_tables,
+    sample_browser,
+)
 from gen_data.report.drawn_parameters import DrawnParameters, Parameter, draw_parameters
 from gen_data.report.label_files import read_records, read_scans
 from gen_data.report.label_gaps import count_objects, find_label_gaps, read_label_map
@@ -81,7 +87,8 @@ def describe_dataset(
         objects.add(image)
         checks.add(image)
     scans = report_tables.make_scan_tables(tuple(read_scans(folder)))
-    tables = (*_label_tables(stored), *report_tables.make_tables(objects.survey), *scans)
+    voxels = occupancy_statistics.count_occupancy(stored).tables()
+    tables = (*_label_tables(stored), *report_tables.make_tables(objects.survey), *scans, *voxels)
     progress("images")
     files, looks = _measure(stored, objects.splits)
     progress("parameters")
@@ -126,11 +133,12 @@ def _label_tables(stored: StoredSamples) -> Iterator[report_tables.Table]:
 
 
 def without_pictures(report: Json) -> Json:
-    """The report without ``data:`` URLs and points, for ``report.json``."""
+    """The report without ``data:`` URLs, points and lines, for ``report.json``."""
 
     def strip(value: Any) -> Any:
         if isinstance(value, dict):
-            left = {k: strip(v) for k, v in value.items() if k not in ("pictures", "points")}
+            dropped = ("pictures", *sample_browser.DRAWN)
+            left = {k: strip(v) for k, v in value.items() if k not in dropped}
             return left | ({"picture": ""} if "picture" in left else {})
         return [strip(item) for item in value] if isinstance(value, list) else value
 

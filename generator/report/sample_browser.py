@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 from gen_data.core import boxes, capture, skeletons
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from gen_data.preview import overlay, palette
+from gen_data.exporters import label_parts
+from gen_data.exporters.label_colors import Rgb
+from gen_data.preview import overlay, palette, voxel_view
+from gen_data.report.occupancy_statistics import grid_facts
 from gen_data.runner.stored import LabelledImages, StoredSamples
 
 WIDTH_PX = 640
@@ -28,8 +31,12 @@ PIECES = 12
 """Number of straight pieces that show an edge of a box."""
 NEAR_M = 0.01
 """Points nearer to the camera plane than this have no place in a straight image."""
+DRAWN = ("points", "lanes", "tracks")
+"""Facts about an image that the page draws, and its figures do not contain."""
 FAR_LOG_M = (1.0, 100.0)
 """Ends of the logarithmic colour scale of laser points."""
+
+LAYERS = (*capture.LAYERS, capture.Channel.SEEN_IN_MIRROR)
 
 DEPTHS = (capture.Channel.Z_DEPTH, capture.Channel.RANGE, capture.Channel.MEASURED_DEPTH)
 
@@ -40,8 +47,10 @@ class BrowserImage:
 
     Attributes:
         facts: Index, camera, size and labels.
-        pictures: ``rgb``, and ``depth`` and ``masks`` if the data set has them. A pixel of
-            ``masks`` is the number of its object in ``facts["objects"]``, from 1; 0 = none.
+        pictures: ``rgb``, and ``depth``, ``masks``, ``occupancy`` and ``layers`` if there are any.
+            A pixel of ``masks`` is the number of its object in ``facts["objects"]``, from 1; 0 =
+            none. ``occupancy`` is the sample's, from above, with X upwards. ``layers`` has
+            layers of depth, ids and materials, and mirrors, one below the other.
     """
 
     facts: dict[str, Any]
@@ -49,9 +58,9 @@ class BrowserImage:
 
     @property
     def bytes(self) -> int:
-        """Size of the pictures and points in the page."""
-        points = str(self.facts.get("points", ""))
-        return sum(map(len, self.pictures.values())) + len(points)
+        """Size of the pictures, points and lines in the page."""
+        drawn = (str(self.facts.get(name, "")) for name in DRAWN)
+        return sum(map(len, (*self.pictures.values(), *drawn)))
 
 
 def browser_images(stored: StoredSamples, bytes_max: int) -> list[BrowserImage]:
@@ -125,7 +134,70 @@ def _browser_image(sample: LabelledImages, camera: str) -> BrowserImage:
     points = _laser_points(sample, truth)
     if points:
         facts["points"] = points
+    facts |= _lanes_and_tracks(sample, camera)
+    layers = [channel for channel in LAYERS if channel in reading.channels]
+    if layers:
+        facts["layers"] = [channel.value for channel in layers]
+        pictures["layers"] = _jpeg(_layer_pictures(reading, layers), JPEG_QUALITY)
+    grid = None if sample.frame is None else sample.frame.occupancy
+    if grid is not None:
+        facts["occupancy"] = grid_facts(grid)
+        above = voxel_view.view_from_above(grid, sample.scene)
+        pictures["occupancy"] = _png(_shrink(above[..., ::-1], WIDTH_PX, cv2.INTER_NEAREST))
     return BrowserImage(facts, pictures)
+
+
+def _lanes_and_tracks(sample: LabelledImages, camera: str) -> dict[str, Any]:
+    """Borders of lanes and tracked points in an image, in whole pixels; empty without both.
+
+    Parts of borders are [colour, visible, [x, y, x, y, ...]], points [colour, visible, x, y].
+    """
+    facts: dict[str, Any] = {}
+    borders = sample.truth[camera].borders or ()
+    if borders:
+        facts["lanes"] = [
+            [
+                _hex(label_parts.border_color(b.kind)),
+                seen,
+                np.rint(line).astype(int).ravel().tolist(),
+            ]
+            for b in borders
+            for seen, line in label_parts.split_border(b)
+        ]
+    tracks = sample.frame.tracks if sample.frame is not None else None
+    if tracks is not None and camera in tracks.sensors:
+        points = tracks.sensors[camera]
+        colors = label_parts.track_colors(len(points.state))
+        facts["tracks"] = [
+            [
+                _hex(colors[k]),
+                bool(points.visible[k]),
+                *np.rint(points.image_px[k]).astype(int).tolist(),
+            ]
+            for k in label_parts.inside_image(points).tolist()
+        ]
+    return facts
+
+
+def _hex(color: Rgb) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*color)
+
+
+def _layer_pictures(
+    reading: capture.SensorReading, channels: Sequence[capture.Channel]
+) -> NDArray[np.uint8]:
+    """Layers and mirrors in their colours, one below the other, BGR."""
+    images = [
+        image
+        for channel in channels
+        for image in (
+            overlay.layer_images(reading, channel)
+            if channel in capture.LAYERS
+            else [overlay.channel_image(reading, channel)]
+        )
+    ]
+    small = [_shrink(image[..., ::-1], WIDTH_PX // 2, cv2.INTER_NEAREST) for image in images]
+    return np.concatenate(small)
 
 
 def _object(item: ObjectTruth, intrinsics: Intrinsics) -> dict[str, Any]:
@@ -253,6 +325,7 @@ def _jpeg(bgr: NDArray[np.uint8], quality: int) -> str:
     return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode()
 
 
-def _png(grey: NDArray[np.uint8]) -> str:
-    _, data = cv2.imencode(".png", grey)
+def _png(pixels: NDArray[np.uint8]) -> str:
+    """``data:`` URL of a grey or BGR image."""
+    _, data = cv2.imencode(".png", pixels)
     return "data:image/png;base64," + base64.b64encode(data.tobytes()).decode()

@@ -37,7 +37,9 @@ class Line:
 
     def local(self, s_m: Array) -> Array:
         """Poses [n, 3] at arc lengths [n]."""
-        return np.stack([s_m, np.zeros_like(s_m), np.zeros_like(s_m)], axis=1)
+        poses = np.zeros((len(s_m), 3))
+        poses[:, 0] = s_m
+        return poses
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +124,17 @@ class Placed:
     heading_rad: float
     curve: Curve
 
+    def poses(self, s_m: Array) -> Array:
+        """Poses [n, 3] at arc lengths [n] of the whole line, clipped to the curve's ends."""
+        along = np.minimum(np.maximum(s_m - self.s_m, 0.0), self.curve.length_m)
+        x, y, heading = self.curve.local(along).T
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        poses = np.zeros((len(s_m), 3))
+        poses[:, 0] = self.x_m + c * x - s * y
+        poses[:, 1] = self.y_m + s * x + c * y
+        poses[:, 2] = self.heading_rad + heading
+        return poses
+
 
 @dataclass(frozen=True, slots=True)
 class ReferenceLine:
@@ -137,12 +150,13 @@ class ReferenceLine:
     def poses(self, s_m: Array) -> Array:
         """Poses [n, 3] at arc lengths [n], clipped to the ends."""
         starts = np.array([piece.s_m for piece in self.pieces])
+        if len(starts) == 1:
+            return self.pieces[0].poses(s_m)
         which = np.clip(np.searchsorted(starts, s_m, side="right") - 1, 0, len(starts) - 1)
         poses = np.zeros((len(s_m), 3))
         for k in np.unique(which):
-            piece, here = self.pieces[k], which == k
-            along = np.clip(s_m[here] - piece.s_m, 0.0, piece.curve.length_m)
-            poses[here] = _transform(piece, piece.curve.local(along))
+            here = which == k
+            poses[here] = self.pieces[k].poses(s_m[here])
         return poses
 
     def points(self, s_m: Array, t_m: Array) -> Array:
@@ -169,11 +183,3 @@ def _integral(of: Callable[[Array], Array], upper: Array, panels: int) -> Array:
     x = starts + 0.5 * width * (1.0 + _NODES)
     total: Array = (0.5 * width * _WEIGHTS * of(x)).sum(axis=(1, 2))
     return total
-
-
-def _transform(start: Placed, poses: Array) -> Array:
-    c, s = math.cos(start.heading_rad), math.sin(start.heading_rad)
-    x, y, heading = poses.T
-    return np.stack(
-        [start.x_m + c * x - s * y, start.y_m + s * x + c * y, start.heading_rad + heading], axis=1
-    )

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -113,11 +114,14 @@ class Shape:
     rest: Quaternion | None
 
 
+# A room asks a hundred thousand times for the facts of a few dozen families.
+@lru_cache(maxsize=1024)
 def is_flat(family: str) -> bool:
     """Whether pieces of a family lie on the floor and others stand on them."""
     return bool(declared(family, "flat", False))
 
 
+@lru_cache(maxsize=1024)
 def _free_above_m(family: str) -> float:
     """Height above pieces of a family that others leave free."""
     return float(declared(family, "free_above_m", 0.0))

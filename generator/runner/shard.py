@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gen_data.core import interfaces, serialization
-from gen_data.core.capture import Capture, SensorReading
+from gen_data.core.capture import Capture
 from gen_data.core.errors import GenDataError, SampleError, in_stage
 from gen_data.core.sample import Sample
 from gen_data.runner import durable_files, resident_memory
@@ -234,14 +234,17 @@ def _make_sample(
 
 
 def drop_pixels(sample: Sample) -> Sample:
-    """Remove images and points from a sample; poses and instants of its sensors remain."""
+    """Remove images, points and rows from a sample; sensors keep poses, instants and faults."""
     capture = sample.capture
     readings = {
-        name: SensorReading(reading.sensor, reading.camera, {}, time_s=reading.time_s)
+        name: replace(reading, channels={}, silhouettes={}, signal=None)
         for name, reading in capture.readings.items()
     }
     clouds = {
         name: replace(cloud, points=cloud.points[:0].copy(), origins=None)
         for name, cloud in capture.clouds.items()
     }
-    return replace(sample, capture=Capture(readings, clouds))
+    tables = {
+        name: replace(table, rows=table.rows[:0].copy()) for name, table in capture.tables.items()
+    }
+    return replace(sample, capture=Capture(readings, clouds, tables))

@@ -305,7 +305,7 @@ def read_capture(
         info: Facts about the data set.
         labels: Of the sample.
         folder: Folder of its shard.
-        has_points: Whether scans have their points; those that exporters receive have none.
+        has_points: Whether scans have points and tables rows; exporters receive none.
         read: Reads a file below the folder.
     """
     index = labels.index
@@ -339,7 +339,8 @@ def read_capture(
     def table(name: str) -> Measurements:
         kept = labels.tables[name]
         dtype = measurement_dtypes.columns_dtype(info.sensor(name).columns)
-        rows = _load(table_path(folder, name, index), dtype, read)
+        path = table_path(folder, name, index)
+        rows = _load(path, dtype, read) if has_points else np.zeros(0, dtype)
         return Measurements(name, kept.device, rows, kept.time_s, kept.faults)
 
     return Capture(readings, ReadOnAccess(labels.scans, cloud), ReadOnAccess(labels.tables, table))

@@ -5,16 +5,12 @@ plain data, and ``labels.jsonl`` has them. Faults have their own random streams:
 reading has the same bytes.
 """
 
-from typing import TypeVar
-
 import numpy as np
 from pydantic import Field
 
 from gen_data.config.base_model import Strict
 from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
-
-Reading = TypeVar("Reading")
 
 
 class Rare(Strict):

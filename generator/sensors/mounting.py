@@ -18,6 +18,7 @@ from gen_data.core.motion import STILL, Trajectory, Twist
 from gen_data.core.scene import Camera, Device, Lidar, Scene
 from gen_data.core.scene_time import RIG_AXES
 from gen_data.core.se3 import SE3, Array, turned
+from gen_data.sensors.sensor_faults import SensorFaults
 
 BURIED_M = 0.05
 """Allowed depth of a sensor inside its body's bounding box, which is larger than the body."""
@@ -62,6 +63,7 @@ class Mounted(Strict):
         mounting: Place on the rig from the file of a calibration, instead of ``offset_m`` and the
             angles.
         inside: Whether it may be inside the body that carries its rig.
+        faults: Faults of its readings, whose truth is in the labels; null = none.
     """
 
     rig: str = ""
@@ -73,6 +75,7 @@ class Mounted(Strict):
     time_offset_s: float = Field(0.0, ge=-10, le=10)
     mounting: Mounting | None = None
     inside: bool = False
+    faults: SensorFaults | None = None
 
     @model_validator(mode="after")
     def _is_placed(self) -> Self:

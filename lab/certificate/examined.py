@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gen_data.assemble.config import Config, load_config
 from gen_data.assets.library import Library
 from gen_data.core import capture, errors, streams
+from gen_data.core.reported import copies
 from gen_data.core.sample import Sample
 from gen_data.packs.provision import open_assets
 from gen_data.pipeline.finalize_scene import Timeline
@@ -95,6 +96,12 @@ class Examined:
     def images(self) -> Iterator[stored_labels.ImageLabels]:
         """The labels of every image, in order."""
         return stored_labels.read_images(self.stored)
+
+    def arrived(self, index: int, camera: str) -> bool:
+        """Whether exports have an image: a sensor with faults may have lost it."""
+        if "lost" not in self.stored.info.sensor(camera).faults:
+            return True
+        return copies(self.stored.labelled(index).capture.readings[camera]) > 0
 
     def photograph(self, index: int, camera: str) -> NDArray[np.uint8]:
         """The photograph of a camera in a sample, uint8 [h, w, 3]."""

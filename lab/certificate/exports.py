@@ -34,7 +34,7 @@ def check_exports(examined: Examined) -> Iterator[Finding]:
             stated = [
                 labelled_images.image_of(image, examined.photograph(image.index, image.camera))
                 for image in examined.images()
-                if image.camera in cameras
+                if image.camera in cameras and examined.arrived(image.index, image.camera)
             ]
         yield _check_export(examined, root, reader, stated)
 

@@ -1,4 +1,4 @@
-"""Pictures of a sample: its photograph with labels, depth, normals, a scan from above."""
+"""Pictures of a sample: its photograph with labels, depth, normals, layers, a scan from above."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -7,6 +7,7 @@ from gen_data.core import plugins
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import Modality, SensorInfo
 from gen_data.core.sample import Sample
+from gen_data.preview.lane_view import draw_borders
 from gen_data.preview.overlay import Image, channel_image, draw_labels
 from gen_data.preview.sensor_views import top_view
 from gen_data.runner.stored import LabelledImages
@@ -17,6 +18,7 @@ LAYERS: Mapping[str, str] = {
     "keypoints": "keypoints",
     "boxes3d": "boxes3d",
     "names": "boxes2d",
+    "lanes": "lanes",
 }
 """Annotation that each kind of label on a photograph needs."""
 
@@ -24,10 +26,12 @@ KINDS: Mapping[str, tuple[Channel, ...]] = {
     "photo": (Channel.RGB,),
     "depth": (Channel.Z_DEPTH, Channel.RANGE),
     "normals": (Channel.NORMALS,),
+    "layers": (Channel.INSTANCE_LAYERS,),
+    "mirrors": (Channel.SEEN_IN_MIRROR,),
     "scan": (),
     "device": (),
 }
-"""Pictures of a sample, and the channels of cameras that they need."""
+"""Pictures of a sample, and the channels of cameras that they need; layers are side by side."""
 
 _MODALITIES = {Modality.CAMERA: "photo", Modality.LIDAR: "scan", Modality.DEVICE: "device"}
 
@@ -82,6 +86,9 @@ def draw_view(
         return image
     reading = sample.capture.readings[name]
     if view.kind == "photo" and Channel.RGB in reading.channels:
-        return draw_labels(reading, sample.truth[name], unit, view.layers)
+        image = draw_labels(reading, sample.truth[name], unit, view.layers)
+        if "lanes" in view.layers:
+            draw_borders(image, sample.truth[name].borders or (), unit)
+        return image
     shown = next((c for c in KINDS[view.kind] if c in reading.channels), None)
     return channel_image(reading, shown or next(iter(reading.channels)))

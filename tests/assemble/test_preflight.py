@@ -180,3 +180,43 @@ def test_a_camera_on_a_carrier_that_looks_away_is_named() -> None:
 def test_shipped_configurations_pass_without_a_warning(name: str) -> None:
     """One of each kind of camera; other tests check the rest."""
     check(name)
+
+
+def marker(distance_m: Any) -> dict[str, Any]:
+    """A marker of 2 cm, 35 mm from corner to corner with its margin, and images of 16 pixels."""
+    prop = {"type": "prop", "asset": "marker?side_m=0.02", "on": "table", "at_m": [0, 0]}
+    coarse = {**CAMERA, "name": "color", "size_px": [16, 12], "hfov_deg": 100}
+    orbit = {"name": "orbit", "distance_m": distance_m}
+    return table(coarse, elements={"tag": prop}, randomizers=[orbit])
+
+
+def test_a_marker_below_a_pixel_in_every_image_is_refused() -> None:
+    """A focal length of 6.7 px makes 0.08 px of 35 mm at 3 m; twice of it with a longer lens."""
+    message = refusal(marker(3.0))
+
+    assert ".asset: 'marker?side_m=0.02' is 0.1" in message
+    assert "px long at most in all images; expected at least one pixel" in message
+
+
+def test_a_marker_that_some_draw_brings_near_is_accepted() -> None:
+    check(marker({"uniform": [0.3, 3.0]}))
+
+
+def prints(*ids: str, **sections: Any) -> dict[str, Any]:
+    """Some assets on a table."""
+    desk = {"type": "surface", "name": "desk", "asset": "table", "top_size_m": [1.3, 0.9]}
+    things = {"type": "objects", "name": "things", "on": "desk", "assets": {"ids": [*ids]}}
+    config = cart({**CAMERA, "name": "front"}, **sections)
+    return {**config, "elements": [*config["elements"], desk, things]}
+
+
+@pytest.mark.filterwarnings("ignore::gen_data.ConfigWarning")
+def test_text_is_refused_where_nothing_is_written_on() -> None:
+    """Apples have none; of mugs some have. Also if only a format asks for it."""
+    expected = "nothing in the scenes is written on; add objects with print"
+    message = refusal(prints("apple?seed=0", annotations=["boxes2d", "text"]))
+    assert f": annotations[1]: {expected}" in message
+    message = refusal(prints("apple?seed=0", exporters=[{"type": "scene_text"}]))
+    assert f": exporters[0]: exporter 'scene_text': {expected}" in message
+    check(prints("apple?seed=0", "mug?seed=0", "mug?seed=44", annotations=["text"]))
+    check(prints("apple?seed=0"))

@@ -1,5 +1,6 @@
 """The cache: same bytes with it, without it, and when it is damaged."""
 
+import os
 import subprocess
 import sys
 from dataclasses import fields
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gen_data.assets import asset_cache
 from gen_data.assets.asset_cache import DiskCache, Store, content_key
 from gen_data.assets.library import open_library
 from gen_data.core.asset_types import MeshData
@@ -110,6 +112,30 @@ def test_a_damaged_large_entry_is_made_anew(tmp_path: Path, damage: str) -> None
     arrays = disk.arrays(key, large_arrays)
     np.testing.assert_array_equal(arrays["x"], large_arrays()["x"])
     assert path.read_bytes() != data
+
+
+def test_a_large_entry_is_checked_once_per_start_of_the_machine_and_again_after_a_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Caches stand for processes; damage that leaves the time of the last change stays unseen.
+
+    On file systems without attributes, it is seen.
+    """
+    key = content_key({"name": "large"})
+    DiskCache(tmp_path).arrays(key, large_arrays)
+    (path,) = entries(tmp_path)
+    is_noted = bool(getattr(os, "listxattr", lambda _: ())(path))
+    unchanged = path.stat()
+    with path.open("r+b") as file:
+        file.seek(150_000)
+        file.write(b"\xff")
+    os.utime(path, ns=(unchanged.st_atime_ns, unchanged.st_mtime_ns))
+    assert (DiskCache(tmp_path).find(key) is not None) == is_noted
+    monkeypatch.setattr(asset_cache, "_boot", lambda: "another start")
+    assert DiskCache(tmp_path).find(key) is None
+    monkeypatch.undo()
+    os.utime(path, ns=(unchanged.st_atime_ns, unchanged.st_mtime_ns + 1_000_000_000))
+    assert DiskCache(tmp_path).find(key) is None
 
 
 def test_derived_arrays_are_stored_by_asset_and_name(tmp_path: Path) -> None:

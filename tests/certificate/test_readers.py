@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import gen_data
+from gen_data.core.reported import copies
 from gen_data.lab.certificate.examined import Examined, Scope
 from gen_data.lab.certificate.exports import check_exports
 from gen_data.lab.certificate.finding import Finding, Status
@@ -115,3 +116,19 @@ def test_a_missing_object_lowers_the_score() -> None:
     assert average_precision(truth, truth, "bbox") == pytest.approx(1.0, abs=1e-12)
     assert average_precision(truth, [image(0, CUP)], "bbox") == pytest.approx(0.5)
     assert average_precision([image(0)], [image(0)], "bbox") == 1.0
+
+
+@pytest.mark.slow
+def test_images_that_are_lost_on_their_way_are_missing_by_design(tmp_path: Path) -> None:
+    """About half of four."""
+    faults = "sensors[0].faults={delivery: {lost: 0.5}}"
+    formats = "exporters=[{type: coco}, {type: mcap}]"
+    overrides = (*SMALL["overrides"], "splits={train: 1}", faults, formats)
+    folder = tmp_path / "table"
+    gen_data.generate(
+        "tabletop.yaml", 4, out=folder, workers=0, seed=1, **{**SMALL, "overrides": overrides}
+    )
+    readings = [StoredSamples(folder).labelled(k).capture.readings["color"] for k in range(4)]
+    assert 0 < sum(map(copies, readings)) < 4
+    assert read(folder, "coco").status is Status.PASSED
+    assert read(folder, "mcap").status is Status.PASSED

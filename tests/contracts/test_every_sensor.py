@@ -15,6 +15,7 @@ from gen_data.core.interfaces import Modality, Renderer
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.measurement_dtypes import TIME, columns_dtype
 from gen_data.core.motion import Trajectory
+from gen_data.core.reported import reported_s
 from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Rig, Scene
 from gen_data.core.scene_time import add_twists, place_sensors, scene_at
 from gen_data.core.se3 import SE3
@@ -22,6 +23,7 @@ from gen_data.core.serialization import canonical_json, from_plain
 from gen_data.core.streams import Streams
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.sensors import TABLE
+from gen_data.sensors.sensor_faults import deliver
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 GIVEN: dict[str, dict[str, Any]] = {
@@ -121,6 +123,25 @@ def test_it_is_where_its_description_says(kind: str) -> None:
     assert isinstance(seen(made(kind)), returned)
     assert bool(info.channels) == (info.modality is Modality.CAMERA)
     assert bool(info.columns) == bool(info.kind) == (info.modality is Modality.DEVICE)
+
+
+@each
+def test_a_wrong_clock_changes_stamps_only(kind: str) -> None:
+    """Half a second at time 0, and 1 % of the time since; errors of size 0 change nothing."""
+    wrong = {"clock": {"offset_s": 0.5, "drift_ppm": 10_000}}
+    clean, rng = seen(made(kind)), Streams(0, scene=0, view=0, step=3).rng("sensor/unit")
+    late = deliver(made(kind, faults=wrong), seen(made(kind, faults=wrong)), rng)
+
+    assert late.time_s == clean.time_s
+    assert reported_s(late) == pytest.approx(1.01 * clean.time_s + 0.5, abs=1e-9)
+    if isinstance(late, Measurements) and isinstance(clean, Measurements):
+        stamps_s = 1.01 * clean.rows["time_s"] + 0.5
+        assert late.rows["time_s"] == pytest.approx(stamps_s, abs=1e-9)
+        late.rows["time_s"] = clean.rows["time_s"]
+    assert data(late) == data(clean)
+    none = made(kind, faults={"clock": {"offset_s": 0, "drift_ppm": 0, "jitter_s": 0}})
+    same = deliver(none, seen(none), rng)
+    assert (data(same), same.faults, reported_s(same)) == (data(clean), {}, clean.time_s)
 
 
 @each

@@ -25,6 +25,7 @@ from gen_data.core.sample import (
     Occupancy,
     SensorTracks,
     Utterance,
+    WordTruth,
 )
 from gen_data.core.scene import Camera, Instance, Lane, Scene
 from gen_data.core.se3 import SE3
@@ -59,6 +60,7 @@ from tests.exporters import (
     test_rerun,
     test_rgbd_sequences,
     test_scans,
+    test_scene_text,
     test_semantickitti,
     test_solo,
     test_tables,
@@ -179,6 +181,7 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
     "texts": (everywhere(Utterance, answer=lambda _: "many"),),
     "times": (everywhere(Scene, PointCloud, SensorReading, time_s=lambda t: 1.5 * t + 0.05),),
     "tracks": (everywhere(SensorTracks, image_px=lambda p: p + 1, position_m=lambda p: -p),),
+    "words": (everywhere(WordTruth, quad_px=lambda q: (*q[1:], q[0])),),
     "voxels": (everywhere(Occupancy, instance_id=lambda a: np.roll(a, 1, axis=0)),),
 }
 """Changed facts."""
@@ -370,6 +373,8 @@ ROWS = {
     "scannet": row(drive, "cameras, categories, centres, depths, ids, photographs",
         test_rgbd_sequences.test_scannet_points_lie_on_the_scene,
         test_rgbd_sequences.test_scannet_labels_are_nyu40_of_instances_in_scans_listed_by_split),
+    "scene_text": row(test_scene_text.texts, "photographs, words",
+        lambda m: test_scene_text.problems(m.folder, m.samples)),
     "semantickitti": row(drive, "categories, points, times",
         test_semantickitti.test_semantic_classes_of_things_that_move,
         test_semantickitti

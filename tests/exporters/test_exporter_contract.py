@@ -11,6 +11,7 @@ from gen_data.exporters.label_map import LabelMap, MappedExporter
 from tests.exporters.drives import drive_info
 from tests.exporters.test_occupancy import gridded
 from tests.exporters.test_opendrive_export import town
+from tests.exporters.test_scene_text import texts
 from tests.exporters.test_tapvid import tracked
 from tests.tiers import sampled
 
@@ -46,8 +47,10 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
         return drive_info(world), gridded(world)
     if exporter.type in ("argoverse2", "map_vectors", "opendrive"):
         return town(world)
-    if exporter.type == "tapvid":
-        return drive_info(world), tracked(world)
+    if exporter.type in ("tapvid", "scene_text"):
+        return (
+            texts(world) if exporter.type == "scene_text" else (drive_info(world), tracked(world))
+        )
     if exporter.type == "bop":
         return world.info(7), world.with_bodies(world.samples)
     return world.info(7, lidars=("top",)), world.samples

@@ -100,6 +100,8 @@ def test_names_of_no_sensor_are_refused_and_disparities_not_rectified(world: Any
     info = world.info(2, lenses={"color": "brown_conrady"})
     with pytest.raises(ConfigError, match=r"exporter 'language': rectify: its texts"):
         viewed("language", rectify=True).check(info)
+    with pytest.raises(ConfigError, match=r"exporter 'scene_text': rectify: its texts"):
+        viewed("scene_text", rectify=True).check(info)
 
 
 def test_scanners_can_be_left_out(world: Any, tmp_path: Path) -> None:

@@ -308,3 +308,10 @@ def test_openlane_refuses_bent_lenses(world: Any) -> None:
     with pytest.raises(ConfigError, match=r"openlane.*pinhole"):
         OpenLane().check(info)
     CULane().check(info)
+
+
+@pytest.mark.parametrize("exporter", [OpenLane(), CULane()])
+def test_scenes_without_a_street_are_refused(exporter: OpenLane | CULane) -> None:
+    exporter.check_scene(scene())
+    with pytest.raises(ConfigError, match=r"lane.*: the scene has no driving lane; add an element"):
+        exporter.check_scene(Scene("table"))

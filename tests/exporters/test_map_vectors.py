@@ -12,7 +12,6 @@ from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Body, Rig, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters.map_vectors import MapVectors, world_lines
-from gen_data.exporters.road_map import road_map
 from tests.exporters.drives import drive_info
 from tests.exporters.test_nuscenes_expansions import on_streets, streets
 from tests.libraries import library
@@ -22,7 +21,7 @@ EGO = SE3.about_z(np.pi, (32.0, 5.25, 0.0))
 
 
 def vectors(exporter: MapVectors, pose: SE3 = EGO) -> dict[str, list[Any]]:
-    lines = world_lines(road_map(streets(), library()))
+    lines = world_lines(streets(), library())
     return {k: [np.array(line) for line in v] for k, v in exporter.vectors(lines, pose).items()}
 
 

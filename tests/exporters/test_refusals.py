@@ -66,6 +66,8 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("motchallenge", {"camera": "middle"}, DRIVE, "camera 'middle'.*left, right"),
     ("nuscenes", {}, DRIVE | {"lidars": ()}, r"there is no lidar; add .*LIDAR_TOP"),
     ("nuscenes", {}, TRAFFIC, r"no category of the data set has a class .* car, van"),
+    ("argoverse2", {}, TRAFFIC, r"no category of the data set has a class .* car, van"),
+    ("cityscapes", {"camera": "left"}, TRAFFIC, r"no category of the data set has a class .* car"),
     ("nuscenes", {}, DRIVE | {"cameras": ("CAM_LEFT", "left")}, "'CAM_LEFT' and 'left' both"),
     ("pointclouds", {}, {}, "add a sensor of that type"),
     ("scannet", {}, RGB_ONLY, "camera 'color' does not write the channel depth"),

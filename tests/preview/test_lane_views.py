@@ -11,9 +11,9 @@ from gen_data.core.lane_geometry import LaneBorder
 from gen_data.core.sample import BorderTruth, EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Camera, Scene
 from gen_data.core.se3 import SE3
+from gen_data.exporters.label_parts import BORDER_COLORS, HIDDEN, LIFT_M, split_border
 from gen_data.preview.contact_sheet import make_tiles
-from gen_data.preview.lane_view import COLORS, HIDDEN, split_border
-from gen_data.preview.rerun_recording import LIFT_M, Recorder
+from gen_data.preview.rerun_recording import Recorder
 from tests.preview.test_track_views import _Stream
 
 CAMERA = Camera("color", SE3(), Intrinsics(80, 60, 50.0, 50.0, 40.0, 30.0))
@@ -47,13 +47,13 @@ def test_a_border_is_split_where_it_disappears() -> None:
 def test_sheets_show_borders_in_the_colours_of_their_kinds_and_hidden_parts_darker() -> None:
     (tile,) = make_tiles([sample()], {"color": (Channel.RGB,)}, labels=True)
     image = tile.image
-    np.testing.assert_array_equal(image[42:50, 10], np.tile(COLORS["lane"], (8, 1)))
-    dark = np.rint(HIDDEN * np.array(COLORS["lane"]))
+    np.testing.assert_array_equal(image[42:50, 10], np.tile(BORDER_COLORS["lane"], (8, 1)))
+    dark = np.rint(HIDDEN * np.array(BORDER_COLORS["lane"]))
     # A smooth line of one pixel covers a tenth less of its pixels, a fifth less where parts meet.
     shares = (image[12:36, 10] - 90.0) / (dark - 90.0)
     assert (shares > 0.8).all()
     assert (shares <= 1.0).all()
-    np.testing.assert_array_equal(image[12:48, 60], np.tile(COLORS["edge"], (36, 1)))
+    np.testing.assert_array_equal(image[12:48, 60], np.tile(BORDER_COLORS["edge"], (36, 1)))
     assert (image[:, 15:55] == 90).all()
     (plain,) = make_tiles([sample()], {"color": (Channel.RGB,)}, labels=False)
     assert (plain.image == 90).all()
@@ -67,14 +67,14 @@ def test_rerun_has_borders_in_the_world_and_their_visible_and_hidden_parts_in_th
     (world,) = stream.logged["world/lanes"]
     strips = np.array(world.strips.as_arrow_array().to_pylist())  # type: ignore[attr-defined]
     np.testing.assert_allclose(strips, [np.add(b.points_m, (0, 0, LIFT_M)) for b in WORLD])
-    assert colors_of(world) == [COLORS["lane"], COLORS["edge"]]
+    assert colors_of(world) == [BORDER_COLORS["lane"], BORDER_COLORS["edge"]]
 
     (image,) = stream.logged[PATH]
     lines = image.strips.as_arrow_array().to_pylist()  # type: ignore[attr-defined]
     parts = [PLACES[:2], PLACES[1:], EDGE.points_px]
     assert lines == [[list(place) for place in part] for part in parts]
-    dark = tuple(round(HIDDEN * value) for value in COLORS["lane"])
-    assert colors_of(image) == [COLORS["lane"], dark, COLORS["edge"]]
+    dark = tuple(round(HIDDEN * value) for value in BORDER_COLORS["lane"])
+    assert colors_of(image) == [BORDER_COLORS["lane"], dark, BORDER_COLORS["edge"]]
     assert image.radii.as_arrow_array().to_pylist() == [-1.5, -0.75, -1.5]  # type: ignore[attr-defined]
 
 

@@ -19,9 +19,10 @@ from gen_data.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.core.se3 import IDENTITY, SE3, look_at
 from gen_data.core.skeletons import PERSON
+from gen_data.exporters.label_colors import color_ids, id_color
 from gen_data.preview.contact_sheet import GAP_PX, arrange_tiles
 from gen_data.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
-from gen_data.preview.palette import color_depth, color_ids, color_shares, id_color
+from gen_data.preview.palette import color_depth, color_shares
 from gen_data.preview.rerun_recording import Recorder
 from gen_data.preview.sensor_views import ROW_PX, point_colors, range_view, top_view
 

@@ -8,8 +8,8 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import EgoTruth, ImageTruth, PointTracks, Sample, SensorTracks
 from gen_data.core.scene import Camera, Scene
 from gen_data.core.se3 import SE3
+from gen_data.exporters.label_colors import id_color
 from gen_data.preview.contact_sheet import make_tiles
-from gen_data.preview.palette import id_color
 from gen_data.preview.rerun_recording import Recorder
 
 CAMERA = Camera("color", SE3(), Intrinsics(80, 60, 50.0, 50.0, 40.0, 30.0))

@@ -8,10 +8,9 @@ from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import EgoTruth, Occupancy, Sample
 from gen_data.core.scene import Instance, Scene
 from gen_data.core.se3 import SE3
+from gen_data.exporters.label_colors import SURFACE_COLORS, id_color
 from gen_data.preview.contact_sheet import make_tiles
-from gen_data.preview.palette import id_color
 from gen_data.preview.rerun_recording import Recorder
-from gen_data.preview.sensor_views import COLORS
 
 CAR = Instance(5, "car/5", "car", 2, "car")
 
@@ -35,11 +34,11 @@ def test_voxels_are_drawn_in_the_colour_of_their_class_and_darker_where_nobody_s
     assert tile.caption == "occupancy"
     pixels = tile.image.reshape(-1, 3)
     car = (pixels == id_color(CAR.category_id)).all(axis=1).sum()
-    grass = (pixels == COLORS["grass"]).all(axis=1).sum()
+    grass = (pixels == SURFACE_COLORS["grass"]).all(axis=1).sum()
     # The car hides one row of grass behind it.
     assert 190.0 / 8.0 - 2.0 < grass / car < 192.0 / 8.0
     (dark,) = make_tiles([sample(observed=False)], {}, labels=True)
-    assert not (dark.image.reshape(-1, 3) == COLORS["grass"]).all(axis=1).any()
+    assert not (dark.image.reshape(-1, 3) == SURFACE_COLORS["grass"]).all(axis=1).any()
     assert (dark.image.any(axis=-1) == tile.image.any(axis=-1)).mean() > 0.99
 
 

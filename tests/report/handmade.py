@@ -15,12 +15,21 @@ from gen_data.core.boxes import BoxPx, OrientedBox
 from gen_data.core.capture import POINT, Capture, Channel, PointCloud, SensorReading
 from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo, cloud_path, media_path
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.sample import ImageTruth, KeypointTruth, MaskPx, ObjectTruth, Sample
+from gen_data.core.sample import (
+    BorderTruth,
+    EgoTruth,
+    ImageTruth,
+    KeypointTruth,
+    MaskPx,
+    ObjectTruth,
+    Sample,
+)
 from gen_data.core.scene import Camera, Instance, Lidar, Scene
 from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.core.serialization import to_plain
 from gen_data.runner.labels import labels_line
 from gen_data.runner.plan import Plan, plan_bytes
+from gen_data.runner.provenance import scene_line
 
 WIDTH_PX, HEIGHT_PX = 64, 48
 CAMERA = Camera("color", IDENTITY, Intrinsics.from_hfov(WIDTH_PX, HEIGHT_PX, math.radians(60)))
@@ -70,9 +79,11 @@ def write_dataset(
     samples: Sequence[Sequence[ObjectTruth]],
     categories: tuple[str, ...],
     images: Sequence[NDArray[np.uint8]],
+    frames: Sequence[EgoTruth] = (),
+    borders: tuple[BorderTruth, ...] | None = None,
     **changes: Any,
 ) -> Path:
-    """A finished data set with a camera and a laser scanner, in one shard; images in turn.
+    """A finished data set with a camera and a laser scanner, in one shard; images, frames in turn.
 
     Scene ``k`` is sample ``k``; every fourth sample is in the split ``val``. Depth is 2 m
     everywhere; the scanner has three points, of which one is behind the camera.
@@ -104,9 +115,16 @@ def write_dataset(
     camera = replace(CAMERA, intrinsics=Intrinsics.from_hfov(width_px, height_px, math.radians(60)))
     depth = np.full((height_px, width_px), 20_000, np.uint16)  # of 0.1 mm
     depth_png = cv2.imencode(".png", depth)[1].tobytes()
-    with (shard / "labels.jsonl").open("w", encoding="utf-8") as labels:
+    with (
+        (shard / "labels.jsonl").open("w", encoding="utf-8") as labels,
+        (shard / "scenes.jsonl").open("w", encoding="utf-8") as scenes,
+    ):
         for index, objects in enumerate(samples):
-            labels.write(labels_line(_sample(index, objects, camera)) + "\n")
+            frame = frames[index % len(frames)] if frames else None
+            truth = {"color": ImageTruth(camera, tuple(objects), borders=borders)}
+            sample = replace(_sample(index, objects, camera), frame=frame, truth=truth)
+            labels.write(labels_line(sample) + "\n")
+            scenes.write(scene_line(sample, None) + "\n")
             media_path(shard, "color", Channel.RGB, index).write_bytes(pngs[index % len(pngs)])
             media_path(shard, "color", Channel.Z_DEPTH, index).write_bytes(depth_png)
             np.save(cloud_path(shard, "top", index), POINTS)
@@ -125,5 +143,5 @@ def _sample(index: int, objects: Sequence[ObjectTruth], camera: Camera) -> Sampl
             {"color": SensorReading("color", camera, {})},
             {"top": PointCloud("top", Lidar("top", "color"), POINTS)},
         ),
-        truth={"color": ImageTruth(camera, tuple(objects))},
+        truth={},
     )

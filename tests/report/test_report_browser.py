@@ -12,6 +12,7 @@ from gen_data.report.html_page import format_page
 from gen_data.report.report_data import describe_dataset
 from tests.browser import Opened, open_browser
 from tests.report.handmade import HOSTILE, HOSTILE_NAME, make_image, make_object, write_dataset
+from tests.report.test_report_layers import BORDERS, make_frame
 
 pytestmark = pytest.mark.slow
 
@@ -21,8 +22,9 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
     folder = tmp_path_factory.mktemp("sets")
     rng = np.random.default_rng(5)
     samples = [[make_object(1, "car"), make_object(2, "bus", 40, 16)]] * 14 + [[]]
+    frames = [make_frame()] * 14 + [make_frame(0)]
     sets = [
-        write_dataset(folder / name, samples, ("bus", "car"), [make_image(rng)])
+        write_dataset(folder / name, samples, ("bus", "car"), [make_image(rng)], frames, BORDERS)
         for name in ("one", "two")
     ]
     path = folder / "index.html"
@@ -48,7 +50,7 @@ def test_layers_and_filters_change_the_shown_image(opened: Opened) -> None:
     """By buttons and by keys; no message and no request but for the page itself."""
     page = opened.page
     assert shown(opened).startswith("1 of 15: sample 0, color")
-    for layer in ("boxes", "boxes3d", "masks", "keypoints", "points", "depth"):
+    for layer in ("boxes", "boxes3d", "masks", "keypoints", "points", "depth", "lanes", "tracks"):
         before = pixels(opened)
         page.click(f"button[data-layer={layer}]")
         page.wait_for_function(
@@ -58,11 +60,16 @@ def test_layers_and_filters_change_the_shown_image(opened: Opened) -> None:
     page.wait_for_function(
         "!document.querySelector('.stage canvas').dataset.layers.includes('depth')"
     )
+    caption = page.inner_text(".above figcaption")
+    assert "voxels of 0.5 m. 8 with a surface, 6 within objects and the ground, 10 free." in caption
+    assert "62.5 % of the surfaces observed by color, top" in caption
+    assert page.evaluate("document.querySelector('.above img').naturalWidth") == 3
     page.keyboard.press("ArrowRight")
     page.wait_for_function("document.querySelector('#shown').textContent.startsWith('2 of 15')")
     page.fill("input[data-filter=size]", "100000")
     page.wait_for_selector(".stage p:not([hidden])")
     assert shown(opened) == "0 images"
+    assert page.locator(".above").is_hidden()
     page.fill("input[data-filter=size]", "")
     page.select_option("select[aria-label='Category of the objects']", "bus")
     page.wait_for_function("document.querySelector('#shown').textContent.includes('1 of 14')")

@@ -8,7 +8,7 @@ import pytest
 from gen_data.content.roads import FAMILIES, TEXTURES
 from gen_data.content.roads.lane_textures import asphalt_color, asphalt_lane
 from gen_data.content.roads.markings import stripes
-from gen_data.content.roads.painted_signs import ARROWS, arrow, word_polygons
+from gen_data.content.roads.painted_signs import ARROWS, arrow, letter_polygons
 from gen_data.core.asset_types import MeshData
 from gen_data.core.errors import AssetError
 from gen_data.roads.cross_section import RoadShape, height_m
@@ -229,12 +229,12 @@ def test_arrows_lie_before_the_end_that_they_lead_to() -> None:
 
 def test_words_need_known_letters() -> None:
     """A letter that has no shape is refused; a word fits its lane."""
-    points = np.concatenate(word_polygons("SCHOOL", 2.5))
+    points = np.concatenate([p for strokes in letter_polygons("SCHOOL", 2.5) for p in strokes])
 
     assert np.ptp(points[:, 1]) < 2.5
     assert np.ptp(points[:, 0]) == pytest.approx(2.4, abs=0.35)
     with pytest.raises(AssetError, match="text"):
-        word_polygons("STÖP", 2.5)
+        letter_polygons("STÖP", 2.5)
 
 
 @pytest.mark.parametrize("carriageway", ["concrete", "cobbles", "gravel", "earth"])

@@ -44,6 +44,12 @@ ROWS: list[tuple[str, dict[str, Any], str]] = [
     ("rgb_camera", {"rolling_shutter": {"readout_s": -0.01}}, "rolling_shutter"),
     ("rgb_camera", {"rolling_shutter": {"readout_s": 0.01, "direction": "left"}}, "direction"),
     ("watcher", {"events": ["crash"]}, "events"),
+    ("imu", {"faults": {"dead_pixels": 0.1}}, "dead_pixels"),
+    ("depth_camera", {"faults": {"dead_pixels": 0.1}}, "dead_pixels"),
+    ("radar", {"faults": {"clock": {"offset_s": 61}}}, "offset_s"),
+    ("gnss", {"faults": {"clock": {"jitter_s": -0.1}}}, "jitter_s"),
+    ("radar", {"faults": {"delivery": {"lost": 1.1}}}, "lost"),
+    ("lidar", {"faults": {"extrinsics": {"rotation_deg": -1}}}, "rotation_deg"),
 ]
 
 

@@ -43,7 +43,7 @@ def phone_screen(seed: int, kind: str = "lit") -> TextureData:
         albedo = np.full((512, 512, 3), 0.045, np.float32) + 0.02 * smudge[..., None]
         return TextureData(quantize(albedo), quantize(0.15 + 0.7 * smudge))
     make = rng.choose((_home, _home, _chat, _lock, _map, _page))
-    image = make(rng).rotate(-90, expand=True)
+    image = art.turn(make(rng), -1)
     made = art.resize_texture(image, 512, 512)
     dark: TextureData = TextureData((made.albedo // 12 + 9).astype(np.uint8), emission=made.albedo)
     return dark

@@ -18,6 +18,7 @@ from gen_data.content.procedural.textures.artwork import Box, Color, Place
 from gen_data.content.procedural.textures.pictures import MANNERS, picture
 from gen_data.core.asset_types import TextureData
 from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.writing import UNDETERMINED
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -114,7 +115,7 @@ def _estate_label(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     face = rng.choose(("serif", "script", "serif"))
     name = design.brand.title() if face == "script" else design.brand.upper()
     brand = (0.1, 0.45, 0.9, 0.6) if top else (0.1, 0.12, 0.9, 0.3)
-    art.lettering(image, brand, name, ink, face, 4)
+    art.lettering(image, brand, name, ink, face, 4, UNDETERMINED)
     region = rng.choose(_WORDS["regions"])
     art.lettering(image, (0.15, 0.68, 0.85, 0.75), region, ink, "serif", 2)
     art.lettering(
@@ -135,7 +136,8 @@ def _plain_label(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     if rng.chance(0.6):
         y = int(rng.choose((0.0, 0.34, 0.8)) * h)
         art.pen(image).rectangle([0, y, w, y + int(0.09 * h)], fill=design.second)
-    art.lettering(image, (0.1, 0.14, 0.9, 0.3), design.brand, ink, rng.choose(("wide", "serif")), 5)
+    face = rng.choose(("wide", "serif"))
+    art.lettering(image, (0.1, 0.14, 0.9, 0.3), design.brand, ink, face, 5, UNDETERMINED)
     art.text(image, (0.15, 0.46, 0.85, 0.53), rng.choose(_WORDS["products"]), ink, 1)
     art.text(image, (0.2, 0.55, 0.8, 0.6), design.note, ink, 0)
     art.lines(image, (0.14, 0.63, 0.86, 0.79), ink, paper, _small_print(rng))
@@ -153,7 +155,7 @@ def _badge_label(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     draw.rectangle([0, 0.43 * h, w, 0.63 * h], fill=design.accent)
     ink = _readable(design, design.accent)
     face = rng.choose(("serif", "wide", "script"))
-    art.lettering(image, (0.06, 0.44, 0.94, 0.62), design.brand, ink, face, 6)
+    art.lettering(image, (0.06, 0.44, 0.94, 0.62), design.brand, ink, face, 6, UNDETERMINED)
     under = _readable(design, design.second)
     art.text(image, (0.24, 0.67, 0.76, 0.73), rng.choose(_WORDS["beers"]), under, 1)
     art.text(image, (0.38, 0.77, 0.62, 0.82), design.size, under, 0)
@@ -211,10 +213,10 @@ def _wrap(width: int, aspect: float, design: _Design, rng: VariantRng) -> Image:
     canvas = art.canvas(width, height, design.ground)
     # Less than half of a cylinder is visible at once.
     front = _front(int(0.42 * width), height, design, rng)
-    canvas.paste(front, (int(0.29 * width), 0))
+    art.paste(canvas, front, (int(0.29 * width), 0))
     end = int(0.25 * width)
-    canvas.paste(_info(end, height, design, rng), (int(0.74 * width), 0))
-    canvas.paste(_side(end, height, design, rng), (int(0.01 * width), 0))
+    art.paste(canvas, _info(end, height, design, rng), (int(0.74 * width), 0))
+    art.paste(canvas, _side(end, height, design, rng), (int(0.01 * width), 0))
     _bands(canvas, design)
     return canvas
 
@@ -232,7 +234,7 @@ def _front(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     if design.layout in (1, 4):
         art.panel(image, brand, design.second)
     ink = design.ink if on_ground else _readable(design, design.second)
-    art.text(image, brand, design.brand, ink, design.bold)
+    art.text(image, brand, design.brand, ink, design.bold, UNDETERMINED)
     art.text(image, product, design.product, design.ink, 1)
     note = (0.05, 0.9, 0.5, 0.97) if tall else (0.05, 0.76, 0.4, 0.88)
     size = (0.68, 0.91, 0.95, 0.97) if tall else (0.44, 0.78, 0.6, 0.88)
@@ -328,7 +330,7 @@ def _info(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     paper = art.blend(design.ground, (255, 255, 255), 0.25)
     image = art.canvas(w, h, paper)
     ink = (25, 25, 28) if sum(paper) > 330 else (240, 240, 240)
-    art.text(image, (0.08, 0.03, 0.92, 0.11), design.brand, ink, 1)
+    art.text(image, (0.08, 0.03, 0.92, 0.11), design.brand, ink, 1, UNDETERMINED)
     art.lines(image, (0.08, 0.13, 0.92, 0.34), ink, paper, _small_print(rng))
     art.table(image, (0.08, 0.36, 0.92, 0.66), ink, rng)
     art.barcode(image, (0.1, 0.72, 0.9, 0.95), rng)
@@ -340,8 +342,8 @@ def _side(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     image = art.canvas(w, h, design.second)
     ink = _readable(design, design.second)
     turned = art.canvas(int(0.62 * h), max(8, int(0.7 * w)), design.second)
-    art.text(turned, (0.0, 0.1, 1.0, 0.9), design.brand, ink, design.bold)
-    image.paste(turned.rotate(90, expand=True), (int(0.15 * w), int(0.04 * h)))
+    art.text(turned, (0.0, 0.1, 1.0, 0.9), design.brand, ink, design.bold, UNDETERMINED)
+    art.paste(image, art.turn(turned, 1), (int(0.15 * w), int(0.04 * h)))
     art.lines(image, (0.1, 0.7, 0.9, 0.97), ink, design.second, _small_print(rng))
     return image
 
@@ -349,7 +351,7 @@ def _side(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
 def _strip(w: int, h: int, design: _Design) -> Image:
     image = art.canvas(w, h, design.second)
     ink = _readable(design, design.second)
-    art.text(image, (0.1, 0.2, 0.9, 0.8), design.brand, ink, design.bold)
+    art.text(image, (0.1, 0.2, 0.9, 0.8), design.brand, ink, design.bold, UNDETERMINED)
     return image
 
 
@@ -362,7 +364,9 @@ def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: V
     art.text(image, (0.1, 0.22, 0.9, 0.34), words[1], design.ink, 3)
     art.panel(image, (0.0, 0.87, 1.0, 0.97), design.second)
     author = f"{design.brand} {rng.choose(_WORDS['ends']).title()}"
-    art.text(image, (0.2, 0.895, 0.8, 0.945), author, _readable(design, design.second), 1)
+    art.text(
+        image, (0.2, 0.895, 0.8, 0.945), author, _readable(design, design.second), 1, UNDETERMINED
+    )
     return image
 
 
@@ -371,8 +375,8 @@ def _spine(w: int, h: int, design: _Design) -> Image:
     strip = art.canvas(h, w, design.second)
     ink = _readable(design, design.second)
     art.text(strip, (0.06, 0.2, 0.6, 0.8), design.product, ink, 1)
-    art.text(strip, (0.68, 0.25, 0.94, 0.75), design.brand, ink, 1)
-    return strip.rotate(-90, expand=True)
+    art.text(strip, (0.68, 0.25, 0.94, 0.75), design.brand, ink, 1, UNDETERMINED)
+    return art.turn(strip, -1)
 
 
 def _back_cover(w: int, h: int, design: _Design, rng: VariantRng) -> Image:

@@ -27,7 +27,7 @@ def shop_sign(rng: VariantRng) -> TextureData:
     """Four boards above one another, each four times as wide as it is high."""
     sheet = art.canvas(1024, 1024, (0, 0, 0))
     for row in range(BOARDS):
-        sheet.paste(_board(rng), (0, 256 * row))
+        art.paste(sheet, _board(rng), (0, 256 * row))
     return _soiled(art.resize_texture(sheet, 512, 512), 0.06, rng)
 
 
@@ -61,7 +61,7 @@ def wall_advert(rng: VariantRng) -> TextureData:
     """Four square adverts: shapes in strong colours, a large word, small print."""
     sheet = art.canvas(1024, 1024, (0, 0, 0))
     for k in range(ADVERTS**2):
-        sheet.paste(_advert(rng), (512 * (k % ADVERTS), 512 * (k // ADVERTS)))
+        art.paste(sheet, _advert(rng), (512 * (k % ADVERTS), 512 * (k // ADVERTS)))
     return _soiled(art.resize_texture(sheet, 512, 512), 0.12, rng)
 
 
@@ -104,6 +104,7 @@ def graffiti(rng: VariantRng) -> TextureData:
         low = rng.between(0.02, 0.12)
         for grow, paint, bold in ((0.0, edge, 26), (0.0, fill, 12)):
             art.text(image, (left + grow, low, min(right, 1.0), 0.95), letter, paint, bold)
+    art.join(image, 2)
     for _ in range(14):
         x, y = rng.between(40, 980), rng.between(60, 440)
         draw.line([x, y, x + rng.between(-30, 30), y + 60], fill=(245, 245, 245), width=6)

@@ -18,6 +18,7 @@ from gen_data.core.scene import Camera, Lidar, Scene
 from gen_data.core.streams import Rng
 from gen_data.sensors.camera.image_pipeline import ImagePipeline
 from gen_data.sensors.fault_draws import fault_stream
+from gen_data.sensors.sensor_faults import SensorFaults
 
 NONE = Constant(0.0)
 SPOT_RADII = (0.01, 0.06)
@@ -41,7 +42,7 @@ class Overexposed(Strict):
     ev: Annotated[Scalar, Bounds(0, 12)] = Constant(4.0)
 
 
-class CameraFaults(Strict):
+class CameraFaults(SensorFaults):
     """Faults of photographs; a sequence has one camera, whose pixels and dirt stay.
 
     Attributes:

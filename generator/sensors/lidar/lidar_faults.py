@@ -11,6 +11,7 @@ from gen_data.config.distributions import Bounds, Constant, Count, Scalar
 from gen_data.core.capture import PointCloud
 from gen_data.core.streams import Rng
 from gen_data.sensors.fault_draws import fault_stream
+from gen_data.sensors.sensor_faults import SensorFaults
 
 
 class Blocked(Strict):
@@ -25,7 +26,7 @@ class Blocked(Strict):
     width_deg: Annotated[Scalar, Bounds(0, 360)] = Constant(20.0)
 
 
-class LidarFaults(Strict):
+class LidarFaults(SensorFaults):
     """Faults of scans; a sequence has one scanner, whose faults stay.
 
     Attributes:

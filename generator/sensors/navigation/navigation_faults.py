@@ -6,13 +6,13 @@ from typing import Annotated
 
 import numpy as np
 
-from gen_data.config.base_model import Strict
 from gen_data.config.distributions import Bounds, Constant, NonNegative, Scalar
 from gen_data.core.capture import Measurements
 from gen_data.core.geodesy import GeodeticOrigin, to_geodetic
 from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
 from gen_data.sensors.fault_draws import Rare, fault_stream
+from gen_data.sensors.sensor_faults import SensorFaults
 
 PLACES = ("latitude_deg", "longitude_deg", "altitude_m")
 LENGTH_SQUARED_MIN = 1e-12
@@ -30,7 +30,7 @@ class Jumps(Rare):
     lasts_s: NonNegative = Constant(2.0)
 
 
-class GnssFaults(Strict):
+class GnssFaults(SensorFaults):
     """Faults of a GNSS receiver.
 
     Attributes:
@@ -75,7 +75,7 @@ class BiasSteps(Rare):
     rate_deg_s: float = 0.2
 
 
-class ImuFaults(Strict):
+class ImuFaults(SensorFaults):
     """Faults of an IMU.
 
     Attributes:

@@ -3,6 +3,7 @@
 from collections import Counter
 from pathlib import Path
 
+from gen_data.core.reported import copies
 from gen_data.lab.certificate.labelled_images import Loaded
 from gen_data.runner.stored import StoredSamples
 
@@ -23,9 +24,9 @@ def load_mcap(root: Path, stored: StoredSamples) -> Loaded:
     for index in stored.indices:
         capture = stored.labelled(index).capture
         expected["foxglove.CompressedImage"] += sum(
-            len(reading.channels) for reading in capture.readings.values()
+            copies(reading) * len(reading.channels) for reading in capture.readings.values()
         )
-        expected["foxglove.PointCloud"] += len(capture.clouds)
+        expected["foxglove.PointCloud"] += sum(map(copies, capture.clouds.values()))
     faults = [
         f"there are {counts[name]} messages {name}, expected {number}"
         for name, number in sorted(expected.items())

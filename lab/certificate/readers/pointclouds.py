@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gen_data.core.reported import copies
 from gen_data.lab.certificate.labelled_images import Loaded
 from gen_data.runner.stored import StoredSamples
 
@@ -20,7 +21,7 @@ def load_pointclouds(root: Path, stored: StoredSamples) -> Loaded:
         if not np.isfinite(at_m).all():
             faults.append(f"{path.relative_to(root)}: a coordinate is not finite")
     expected = sum(
-        len(cloud.points)
+        len(cloud.points) * copies(cloud)
         for index in stored.indices
         for cloud in stored.labelled(index).capture.clouds.values()
     )

@@ -41,7 +41,12 @@ def infrared_surfaces(per_body: Sequence[BodyMaterials], cache: DeviceCache) -> 
     def records(entry: BodyMaterials) -> NDArray[np.void]:
         return cache.infrared.get(entry.materials, lambda: _pack_infrared(entry.materials, cache))
 
-    return stack_records([records(entry) for entry in per_body], Infrared)
+    # Steps of a sequence have bodies at other places with the same materials.
+    known, own = cache.infrared_scene, [entry.materials for entry in per_body]
+    if known is None or known[0] != own:
+        known = own, stack_records([records(entry) for entry in per_body], Infrared)
+        cache.infrared_scene = known
+    return known[1]
 
 
 def _pack_infrared(materials: Sequence[Material], cache: DeviceCache) -> NDArray[np.void]:

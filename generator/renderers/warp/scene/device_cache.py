@@ -59,7 +59,9 @@ class DeviceCache:
         bodies: The latest packed bodies, which all views of a scene share.
         scenes: The latest packed scene, which all cameras and scanners of a sample share.
         layer_materials: Numbers in ``LAYER_MATERIALS`` of the latest bodies' materials.
+        body_materials: Materials of the latest bodies.
         material_records, infrared: Records of a body's materials, by their tuple.
+        infrared_scene: Materials of the latest bodies that were scanned, and all their records.
         coarsest: The coarsest texel of textures, on the host.
         pages: Returns pages of files to the system.
         shares_memory: Whether the device is the CPU, so that nothing has to cross.
@@ -74,10 +76,12 @@ class DeviceCache:
         self.pages = mapped_files.PageLimiter()
         self.lobes = wp.array(brdf_albedo_lut.lobe_albedo(), dtype=wp.vec2, device=device)
         self.bodies: ObjectCache[Any] = ObjectCache(1)
+        self.body_materials: ObjectCache[Any] = ObjectCache(1)
         self.scenes: ObjectCache[Any] = ObjectCache(1)
         self.layer_materials: ObjectCache[wp.array] = ObjectCache(1)
         self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
         self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
+        self.infrared_scene: tuple[list[Any], NDArray[np.void]] | None = None
         self.coarsest: CountCache[NDArray[np.uint32]] = CountCache(_TEXTURES)
         mesh_bytes = _OWN_MESH_BYTES if device.is_cpu else _MESH_BYTES
         texture_bytes = _OWN_TEXTURE_BYTES if device.is_cpu else _TEXTURE_BYTES

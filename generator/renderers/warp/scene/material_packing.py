@@ -50,11 +50,16 @@ class BodyMaterials:
 
 def body_materials(bodies: Sequence[Body], cache: device_cache.DeviceCache) -> list[BodyMaterials]:
     """Materials of every body, packed once and cached."""
-    own = [body.materials or cache.materials(body.asset) for body in bodies]
-    return [
-        cache.material_records.get(materials, partial(_pack_materials, materials))
-        for materials in own
-    ]
+
+    def pack() -> list[BodyMaterials]:
+        own = (body.materials or cache.materials(body.asset) for body in bodies)
+        return [
+            cache.material_records.get(materials, partial(_pack_materials, materials))
+            for materials in own
+        ]
+
+    packed: list[BodyMaterials] = cache.body_materials.get(bodies, pack)
+    return packed
 
 
 def _pack_materials(materials: tuple[Material, ...]) -> BodyMaterials:
