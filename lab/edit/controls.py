@@ -25,8 +25,6 @@ SECTIONS = ("elements", "randomizers", "sensors")
 GENERAL = "general"
 """Stands for the fields of a configuration outside of these sections."""
 RANGES = ("uniform", "log_uniform", "uniform_integer")
-BEYOND = 1000.0
-"""Legal values this many times as large as the value do not stretch its slider."""
 HIDDEN = frozenset({"type", "name"})
 BINS = 24
 DRAWS = 2000
@@ -44,6 +42,7 @@ class Control:
         value: Plain data of the configuration, or the default.
         form: Name of its distribution; empty for a constant.
         low, high, step: Of the slider.
+        legal: Legal values, which may go beyond the slider; empty = any, or no numbers.
         options: Legal values of a choice; outcomes of weights.
         help: Type, default and description.
         place: ``file:line`` that gives the value; empty for a default.
@@ -56,6 +55,7 @@ class Control:
     low: float = 0.0
     high: float = 1.0
     step: float = 0.01
+    legal: str = ""
     options: tuple[Any, ...] = ()
     help: str = ""
     place: str = ""
@@ -134,7 +134,18 @@ def _control(model: FieldSchema, name: str, node: Node | None) -> Control:
     if kind not in ("number", "range", "normal", "chance"):
         return Control(name, kind, form=form, **known)
     low, high, step = _extent(field, value, form, is_angle=name.endswith("_deg"))
-    return Control(name, kind, form=form, low=low, high=high, step=step, **known)
+    legal = "" if form == "probability" else _legal(field)
+    return Control(name, kind, form=form, low=low, high=high, step=step, legal=legal, **known)
+
+
+def _legal(field: FieldSchema) -> str:
+    """Legal values of a field of numbers, in words."""
+    limits = next((one.limits for one in (field, *field.branches) if one.limits), None)
+    if limits is None:
+        return ""
+    low = f"{'above' if limits.open_low else 'from'} {limits.low:g}"
+    high = f"{'below' if limits.open_high else 'to'} {limits.high:g}"
+    return " ".join(text for text in (low, high) if not text.endswith("inf"))
 
 
 def _kind(field: FieldSchema, value: Any, form: str) -> tuple[str, Sequence[Any]]:
@@ -174,15 +185,13 @@ def _extent(
     limits = next((one.limits for one in (field, *field.branches) if one.limits), None)
     largest = max((abs(number) for number in numbers), default=0.0) or 1.0
     low, high = (-math.inf, math.inf) if limits is None else (limits.low, limits.high)
-    # All that is legal; without a limit, or with one beyond use, a whole turn of angles, and
-    # multiples of other values.
+    # A whole turn of angles; else multiples of the value, and all that is legal if that is little.
     reach = 360.0 if is_angle else 4.0 * largest
-    low = low if low >= -largest * BEYOND else -reach
-    high = high if high <= largest * BEYOND else reach
+    low = low if low >= -reach * 5 else -reach
+    high = high if high <= reach * 5 else reach
     whole = form == "uniform_integer" or field.schema.get("type") == "integer"
     whole = whole or any(one.schema.get("type") == "integer" for one in field.branches)
-    fine = max(min(high - low, 8.0 * largest), 1e-6)  # Small values of a wide range can be set.
-    step = 1.0 if whole else 10.0 ** math.floor(math.log10(fine / 100.0))
+    step = 1.0 if whole else 10.0 ** math.floor(math.log10(max(high - low, 1e-6) / 100.0))
     low = low + step if limits is not None and limits.open_low and low == limits.low else low
     low = round(math.ceil(low / step - 1e-9) * step, 12)  # Sliders count steps from there.
     high = high - step if limits is not None and limits.open_high and high == limits.high else high

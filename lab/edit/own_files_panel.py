@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.panels import Tab
 
 ASSUMED = (
-    "\nnot sure how the camera looked, as no edges confirm a horizon: set 'looks down' "
-    "and 'roll' until the grid lies on the table or the ground"
+    "not sure how the camera looked, as no edges confirm a horizon: set 'looks down' and 'roll' "
+    "until the grid lies on the table or the ground, or the field of view, if you know it"
 )
 SHORTENED = "\nthe ground ends below the horizon: if the grid is tilted, change 'looks down'"
 HEIGHT_HINT = "of the lens; small squares of the grid are 0.1 m"
@@ -91,7 +91,7 @@ class OwnFile:
         self._ranges: list[Any] = []
         self._numbers: dict[str, Any] = {}
         self._tilt_deg, self._roll_deg = 0.0, 0.0  # Of the latest check.
-        self._is_showing = False
+        self._is_showing = self._is_assumed = False
         self._card = ui.element("div").classes("gd-field")
         self._card.props["data-file"] = path.name
         self._jobs = f"{tab.key}/file/{path}"
@@ -125,7 +125,8 @@ class OwnFile:
         self._facts.classes(add="" if self._found else "gd-refused")
         self._facts.classes(remove="gd-refused" if self._found else "")
         self._image.set_visibility(has_picture)
-        self._facts.text = describe(found) if self._found else found.text
+        self._is_assumed = has_picture and found.standpoint.tilt_deg != self._standpoint.tilt_deg
+        self._facts.text = describe(found, self._is_assumed) if self._found else found.text
         if has_picture:
             self._image.set_source(self._tab.desk.pictures.put(found.jpeg))
         is_photograph = own_files.is_photograph(self._path.name)
@@ -146,14 +147,10 @@ class OwnFile:
         self._card.delete()
 
     def _take_over(self, used: Standpoint) -> None:
-        """Show the tilt and the ground that a check has assumed."""
-        given = self._standpoint
-        if self._found and used.tilt_deg != given.tilt_deg:
-            self._facts.text += ASSUMED
-        elif self._found and given.ground is None and used.ground not in (None, GROUND):
+        """Show the ground that a check has assumed."""
+        is_shortened = self._standpoint.ground is None and used.ground not in (None, GROUND)
+        if self._found and is_shortened and not self._is_assumed:
             self._facts.text += SHORTENED
-        if not self._choices.default_slot.children:
-            self._standpoint = replace(given, tilt_deg=used.tilt_deg)
         if self._taken is None:
             self._corners = used.ground or GROUND
             self._draw_corners()
@@ -205,7 +202,12 @@ class OwnFile:
         with ui.element("div").classes("gd-row"):
             for field, label, hint, value in (
                 ("height_m", "camera above table or ground [m]", HEIGHT_HINT, now.height_m),
-                ("tilt_deg", "looks down [deg], empty: from edges", TILT_HINT, now.tilt_deg),
+                (
+                    "tilt_deg",
+                    "looks down [deg], empty: from edges",
+                    TILT_HINT,
+                    self._shown_tilt_deg,
+                ),
                 ("roll_deg", "roll [deg]", ROLL_HINT, self._roll_deg),
                 ("hfov_deg", "field of view across [deg], empty: EXIF", HFOV_HINT, now.hfov_deg),
             ):
@@ -229,12 +231,17 @@ class OwnFile:
                 )
             )
 
+    @property
+    def _shown_tilt_deg(self) -> float | None:
+        """The tilt that was given, else the assumed one; None = estimated."""
+        return self._tilt_deg if self._is_assumed else self._standpoint.tilt_deg
+
     def _show_angles(self) -> None:
         """Show tilt and roll of the check, where they were not given."""
         self._is_showing = True
         is_given = self._standpoint.tilt_deg is not None
         shown = self._standpoint.roll_deg if is_given else self._roll_deg
-        for field, value in (("tilt_deg", self._standpoint.tilt_deg), ("roll_deg", shown)):
+        for field, value in (("tilt_deg", self._shown_tilt_deg), ("roll_deg", shown)):
             if field in self._numbers:
                 self._numbers[field].value = value
         self._is_showing = False
@@ -316,15 +323,16 @@ class OwnFile:
         self._facts.text = "added to the scene"
 
 
-def describe(found: own_files.Checked) -> str:
-    """What a check has found, in lines."""
+def describe(found: own_files.Checked, is_assumed: bool = False) -> str:
+    """Findings of a check, in lines; with an assumed camera, without its horizon."""
     finding = found.finding
     facts = [finding.asset_id]
     if finding.size_m:
         size = " x ".join(f"{edge:.3g}" for edge in finding.size_m)
         facts.append(f"{size} m; unit {finding.unit}; up {finding.up}")
     if finding.note:
-        facts.append(finding.note)
+        room = finding.note.rpartition(", ")[2]
+        facts.append(f"{ASSUMED}; {room} then" if is_assumed else finding.note)
         facts.append(
             "red: horizon; yellow: ground, whose corners can be dragged; blue: a grid of 0.1 m, or "
             "1 m on large ground"

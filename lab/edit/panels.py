@@ -118,7 +118,7 @@ class ControlsPanel:
         for field, control in found.items():
             was = old.get(field)
             if was is not None and is_own and (was.kind, was.form) == (control.kind, control.form):
-                self._places[field].text = control.place or "default"
+                self._places[field].text = _place(control)
             elif control != was:
                 self._cells[field].clear()
                 with self._cells[field]:
@@ -129,7 +129,7 @@ class ControlsPanel:
         field = control.field
         with ui.element("div").classes("gd-row"):
             ui.label(field).classes("gd-name").props["title"] = control.help
-            self._places[field] = ui.label(control.place or "default").classes("gd-place")
+            self._places[field] = ui.label(_place(control)).classes("gd-place")
             if control.kind in ("number", "range", "normal"):
                 ui.button("vary", on_click=partial(self._vary, field)).props(
                     f'dense flat no-caps size=sm aria-label="Vary {field}"'
@@ -279,6 +279,12 @@ class ControlsPanel:
             chart.options.clear()
             chart.options.update(_plot(controls.density(found, drawn)))
             chart.update()
+
+
+def _place(control: controls.Control) -> str:
+    """Where a value comes from, and which are legal."""
+    legal = f"; legal: {control.legal}" if control.legal else ""
+    return (control.place or "default") + legal
 
 
 def _plot(shown: controls.Density | None) -> dict[str, Any]:

@@ -108,8 +108,12 @@ def test_controls_and_layers_change_the_pictures(page: Page) -> None:
     page.mouse.up()
     page.wait_for_function("document.querySelector('.cm-content').textContent.includes('scale: ')")
     wait_for_pictures(page, before)
-    page.wait_for_function(DRAWN)
-    drawn = pictures(page)
+    # Values on the way of the slider have pictures, too: those of the last one stay.
+    drawn: list[bytes] = []
+    while drawn != pictures(page):
+        page.wait_for_function(DRAWN)
+        drawn = pictures(page)
+        page.wait_for_timeout(1500)
     for _ in range(2):
         before = page.evaluate(COUNTS)
         page.click("[data-layer=masks]")

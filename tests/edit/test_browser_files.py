@@ -77,6 +77,10 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
         assert tilt.input_value() == "30"
         card.locator("[data-standpoint=height_m]").fill("1")
         card.locator("[role=status]:has-text('room for things 1.2 m')").wait_for()
+        # It stays unsure, and shows no horizon, until the angle is given.
+        status = card.locator("[role=status]").inner_text()
+        assert "not sure how the camera looked" in status
+        assert "horizon from row" not in status
         # A minute of thought, in which another process clears up.
         for folder in live.temporary.glob("gen-data-edit-*"):
             os.utime(folder, (0, 0))

@@ -130,6 +130,7 @@ def test_controls_follow_the_schema() -> None:
     assert elevation.yaml((10, 20.04)) == {"uniform": [10, 20.04]}
     assert found["clearance_m"].kind == "number"
     assert found["clearance_m"].low == 0
+    assert (elevation.legal, found["clearance_m"].legal) == ("from -90 to 90", "from 0")
     assert found["stage"].options == ("scene", "view")
     assert found["roll_deg"].yaml((1, 2)) == {
         "normal": {"mean": 1, "stddev": 2, "clip": [-10.0, 10.0]}
