@@ -10,6 +10,7 @@ from gen_data.core.sample import Sample
 from gen_data.preview.lane_view import draw_borders
 from gen_data.preview.overlay import Image, channel_image, draw_labels
 from gen_data.preview.sensor_views import top_view
+from gen_data.preview.text_view import draw_texts
 from gen_data.runner.stored import LabelledImages
 
 LAYERS: Mapping[str, str] = {
@@ -19,6 +20,7 @@ LAYERS: Mapping[str, str] = {
     "boxes3d": "boxes3d",
     "names": "boxes2d",
     "lanes": "lanes",
+    "text": "text",
 }
 """Annotation that each kind of label on a photograph needs."""
 
@@ -89,6 +91,8 @@ def draw_view(
         image = draw_labels(reading, sample.truth[name], unit, view.layers)
         if "lanes" in view.layers:
             draw_borders(image, sample.truth[name].borders or (), unit)
+        if "text" in view.layers:
+            draw_texts(image, sample.truth[name].texts or (), unit)
         return image
     shown = next((c for c in KINDS[view.kind] if c in reading.channels), None)
     return channel_image(reading, shown or next(iter(reading.channels)))

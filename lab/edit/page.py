@@ -44,8 +44,22 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 PAUSE_S = 0.04
 """Pause in typing after which a text is read."""
-VIEWS = {"photo": "photograph", "depth": "depth", "normals": "normals", "scan": "LiDAR from above"}
-LAYER_NAMES = {"boxes": "boxes", "masks": "masks", "keypoints": "keypoints", "boxes3d": "3D boxes"}
+VIEWS = {
+    "photo": "photograph",
+    "depth": "depth",
+    "normals": "normals",
+    "layers": "layers through glass",
+    "mirrors": "seen in mirrors",
+    "scan": "LiDAR from above",
+}
+LAYER_NAMES = {
+    "boxes": "boxes",
+    "masks": "masks",
+    "keypoints": "keypoints",
+    "boxes3d": "3D boxes",
+    "lanes": "lanes",
+    "text": "words",
+}
 TABS: dict[str, EditorTab] = {}
 """Open tabs by key."""
 
