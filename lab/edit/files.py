@@ -12,6 +12,8 @@ from gen_data.config.yaml_tree import MAX_FILE_BYTES, Node, parse_yaml
 from gen_data.core.errors import ConfigError, GenDataError, StorageError
 from gen_data.core.whole_files import write_whole
 
+ASSETS = "assets"
+"""Folder of the user's files, next to the configuration."""
 _LINE = re.compile(r"([^\r\n]*)(\r\n|\r|\n|$)")
 _BOM = "\ufeff"
 

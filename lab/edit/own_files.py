@@ -6,6 +6,7 @@ or the walls of its room. Both are copied to ``assets/`` next to the configurati
 
 from __future__ import annotations
 
+import filecmp
 import json
 import math
 import shutil
@@ -20,12 +21,13 @@ import numpy as np
 from gen_data.assets.folder_index import PlateEntry
 from gen_data.assets.plates.plate_import import locate_camera
 from gen_data.config.merging import node_name
+from gen_data.config.yaml_tree import parse_yaml
 from gen_data.core.errors import AssetError, ConfigError, StorageError
 from gen_data.core.plates import Plate, ground_points, tilt_and_roll
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.core.whole_files import write_whole
 from gen_data.lab.edit import photographs, text_edits
-from gen_data.lab.edit.files import read_file
+from gen_data.lab.edit.files import ASSETS, read_file
 from gen_data.lab.edit.photographs import Standpoint
 from gen_data.lab.edit.samples import encode
 from gen_data.preview.plate_overlay import plate_overlay
@@ -37,8 +39,6 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.samples import Studio
     from gen_data.preview.overlay import Image
 
-ASSETS = "assets"
-"""Folder of the user's files, next to the configuration."""
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".webp"})
 SIZE_MAX_BYTES = 200_000_000
 """Larger files are copied to the folder by hand: a browser reads them into memory."""
@@ -267,21 +267,36 @@ def _shrink(image: Image) -> Image:
 def keep_file(folder: Path, path: Path, checked: Checked) -> None:
     """Copy a checked file to the user's folder, and add it to its index.
 
+    A file that is there is not copied; its entry is replaced, as after another angle was given.
+
     Raises:
-        AssetError: a file of that name is there.
+        AssetError: another file of that name is there.
         StorageError: the index has changed meanwhile, or cannot be written.
     """
     target = folder / path.name
-    if target.exists():
-        raise AssetError(f"{target}: a file of that name is there; rename one of them")
-    folder.mkdir(parents=True, exist_ok=True)
-    index = read_file(folder / "assets.yaml")
-    text = index.text or "licence: unknown\n"
     try:
-        shutil.copyfile(path, target)
+        if target.exists() and not filecmp.cmp(path, target, shallow=False):
+            raise AssetError(f"{target}: another file of that name is there; rename one of them")
+        folder.mkdir(parents=True, exist_ok=True)
+        index = read_file(folder / "assets.yaml")
+        if not target.exists():
+            shutil.copyfile(path, target)
     except OSError as error:
         raise StorageError(f"{error.filename}: {error.strerror}; drop {path.name} again") from error
-    index.save(text_edits.append_item(text, checked.section, checked.entry))
+    text = index.text or "licence: unknown\n"
+    number = _entry_number(text, checked)
+    if number is None:
+        index.save(text_edits.append_item(text, checked.section, checked.entry))
+    else:
+        index.save(text_edits.set_value(text, (checked.section, number), checked.entry))
+
+
+def _entry_number(text: str, checked: Checked) -> int | None:
+    """Place of a file's entry in its section of an index; None without one."""
+    section = parse_yaml(text, "").get(checked.section)
+    files = [item.get("file") for item in section.items] if section else []
+    names = [node.content if node else "" for node in files]
+    return names.index(checked.entry["file"]) if checked.entry["file"] in names else None
 
 
 def add_to_scene(text: str, config: Config | None, checked: Checked) -> str:
@@ -322,6 +337,8 @@ def add_to_scene(text: str, config: Config | None, checked: Checked) -> str:
     if surface is None:
         raise ConfigError("elements: no surface holds the object; add one, such as a table")
     name = "".join(c if c.isalnum() else "_" for c in _category(str(checked.entry["file"])))
+    if f"own_{name}" in _named(config, "elements", ("objects",)):
+        return text
     group = {
         "type": "objects",
         "on": surface,
@@ -340,8 +357,6 @@ def add_to_scene(text: str, config: Config | None, checked: Checked) -> str:
 
 def _own_list(text: str) -> bool:
     """Whether the text itself lists the elements, instead of overriding those of a template."""
-    from gen_data.config.yaml_tree import parse_yaml
-
     own = parse_yaml(text or "{}", "").get("elements")
     return own is not None and bool(own.items)
 

@@ -15,6 +15,7 @@ from nicegui import ui
 
 from gen_data.core.errors import ConfigError, GenDataError
 from gen_data.lab.edit import own_files
+from gen_data.lab.edit.files import ASSETS
 from gen_data.lab.edit.photographs import GROUND, UNKNOWN, Corners, Standpoint, rectangle
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class OwnFilesPanel:
         ui.upload(
             on_upload=self._take,
             on_rejected=lambda: ui.notify(
-                f"larger than {most // 1_000_000} MB: copy it to {own_files.ASSETS}/ and list it "
+                f"larger than {most // 1_000_000} MB: copy it to {ASSETS}/ and list it "
                 "in assets.yaml",
                 type="negative",
             ),
@@ -306,7 +307,7 @@ class OwnFile:
     async def _add(self, *, walls: bool = False) -> None:
         await self._is_checked.wait()  # The latest values count.
         session, found = self._tab.session, self._found
-        folder = session.file.path.parent / own_files.ASSETS
+        folder = session.file.path.parent / ASSETS
         try:
             if found is None:
                 raise ConfigError(f"{self._path.name}: cannot be used as it is; see its message")

@@ -57,6 +57,7 @@ LAYER_NAMES = {
     "masks": "masks",
     "keypoints": "keypoints",
     "boxes3d": "3D boxes",
+    "names": "names",
     "lanes": "lanes",
     "text": "words",
 }

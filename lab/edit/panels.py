@@ -501,7 +501,10 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
             )
         with ui.element("div").classes("gd-full"):
             image = ui.element("img").props(f'alt="sample {shown.index}"')
-            image.style(f"aspect-ratio: {shape[0]} / {shape[1]}; width: {shape[0]}px")
+            if order.view.kind == "layers":  # side by side
+                image.style("width: 100%")
+            else:
+                image.style(f"aspect-ratio: {shape[0]} / {shape[1]}; width: {shape[0]}px")
             state = ui.label("rendering ...")
         with ui.element("div").classes("gd-table"):
             objects = ui.element("div")

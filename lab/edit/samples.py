@@ -29,6 +29,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.lab.edit.document import Fault, analyse
+from gen_data.lab.edit.files import ASSETS
 from gen_data.lab.edit.overlays import KINDS, LAYERS, View, draw_view, first_kind
 from gen_data.lab.edit.reuse import Memory, RememberingPhysics
 from gen_data.packs.provision import open_assets
@@ -172,7 +173,9 @@ class Studio:
             GenDataError: as a run of the configuration would.
         """
         started_s = time.process_time()
-        text = repr((order.text, order.file, order.overrides))
+        # Own files may be added again with another pose of the camera, or another unit.
+        own = _index_time_ns(Path(order.file).parent / ASSETS)
+        text = repr((order.text, order.file, order.overrides, own))
         opened = self._opened.get(text, lambda: self._open(order))
         view = opened.choose_sensor(order.view)
         needed = opened.annotations(view)

@@ -193,11 +193,17 @@ class Session:
     def save_as(self, path: Path, *, overwrite: bool = False) -> None:
         """Write another file in the folders of the page, which is edited from now on.
 
+        A name without the ending of YAML gets it.
+
         Raises:
-            StorageError: it is outside, exists, or cannot be written.
+            StorageError: it is outside, exists, has no folder, or cannot be written.
         """
         if not self.folders.contains(path):
             raise StorageError(f"{path} is outside of the folders of this page")
+        if path.suffix not in (".yaml", ".yml"):
+            path = path.with_name(f"{path.name}.yaml")
+        if not path.parent.is_dir():
+            raise StorageError(f"{path.parent} does not exist; expected a folder that is there")
         if path.exists() and not overwrite:
             raise StorageError(f"{path}: a file of that name is there; choose another name")
         self.file = OpenedFile(path, None).save(self.text, overwrite=overwrite)

@@ -329,3 +329,8 @@ def test_folders_follow_links(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match="outside"):
         session.save_as(inside / "link.yaml", overwrite=True)
     assert (tmp_path / "out.yaml").read_text() == "seed: 1\n"
+    with pytest.raises(StorageError, match=r"sub does not exist; expected a folder that is there"):
+        session.save_as(inside / "sub/b.yaml")
+    session.save_as(inside / "second")
+    assert session.file.path == inside / "second.yaml"
+    assert session.file.path.read_text() == "seed: 2\n"

@@ -10,10 +10,11 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import yaml
 
 from gen_data.assemble.config import parse_config
-from gen_data.core.errors import ConfigError
-from gen_data.lab.edit.own_files import Checked, CheckFile, Misplaced
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.lab.edit.own_files import Checked, CheckFile, Misplaced, add_to_scene, keep_file
 from gen_data.lab.edit.photographs import (
     GROUND,
     LOWEST_DEG,
@@ -103,6 +104,28 @@ def test_a_photograph_without_ground_has_the_angle_that_gives_it_some(desk: Path
     assert isinstance(found, Misplaced)
     assert "give 'looks down' 8 or more" in found.text
     assert isinstance(check(desk, tilt_deg=8.0), Checked)
+
+
+def test_a_photograph_that_is_added_again_replaces_its_entry(desk: Path, tmp_path: Path) -> None:
+    """Its camera looked down more; another photograph of that name is refused."""
+    folder, ground = tmp_path / "assets", rectangle((0.2, 0.8), (0.6, 0.9))
+    texts = [""]
+    for tilt_deg in (20.0, 40.0):
+        found = check(desk, tilt_deg=tilt_deg, ground=ground)
+        assert isinstance(found, Checked)
+        keep_file(folder, desk, found)
+        text = texts[-1]
+        config = parse_config(text, str(tmp_path / "a.yaml"), "a") if text else None
+        texts.append(add_to_scene(text, config, found))
+    index = yaml.safe_load((folder / "assets.yaml").read_text())
+    assert [entry["file"] for entry in index["plates"]] == ["desk.png"]
+    # A focal length of 160 px: row 120 less 160 tan 40 deg.
+    assert index["plates"][0]["horizon"]["height_px"] == pytest.approx(-14.3, abs=0.1)
+    assert "user/desk" in texts[1]
+    assert texts[2] == texts[1]
+    cv2.imwrite(str(desk), np.full((240, 320, 3), 90, np.uint8))
+    with pytest.raises(AssetError, match=r"another file of that name is there; rename one"):
+        keep_file(folder, desk, found)
 
 
 def test_an_own_photograph_replaces_those_that_come_with_gen_data() -> None:
