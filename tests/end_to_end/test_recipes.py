@@ -222,7 +222,7 @@ def test_a_finished_data_set_is_proven_again(reader: Path, out: str) -> None:
     again = gen_data.pull("recipe.yaml", out=out, workers=0)
     assert (made.dataset_id, again.already_complete) == (recipe.dataset_id, True)
 
-    edit(reader, recipe.labels[2], "1" * 64)
+    edit(reader, recipe.labels[2], "a" * 64)
     with pytest.raises(gen_data.VerificationError, match=r"shards/000002/labels\.jsonl: differs"):
         gen_data.pull("recipe.yaml", out=out, workers=0, semantic=True)
     edit(reader, recipe.dataset_id, "a" * 64)
@@ -245,7 +245,7 @@ def test_the_files_of_the_author_name_sample_and_field(author: Path, reader: Pat
 def test_labels_that_differ_are_named(reader: Path) -> None:
     record, labels = (getattr(read_recipe(reader / "recipe.yaml").recipe, k)[2]
                       for k in ("shards", "labels"))  # fmt: skip
-    edit(reader, labels, "1" * 64)
+    edit(reader, labels, "a" * 64)
     lines = refused(reader, gen_data.VerificationError, 7, semantic=True)
     assert lines == ["shards/000002/labels.jsonl: differs from the recipe"]
 
