@@ -29,7 +29,7 @@ from gen_data.randomizers.free_space import is_in_the_open
 TRIES = 48
 _MEASURED_MAX = 160
 """Largest number of a group's meshes that are measured before a run."""
-_LENS_CHANGE = 2.0
+LENS_CHANGE = 2.0
 """Largest factor by which other randomizers are assumed to change a camera's focal length."""
 
 
@@ -233,13 +233,13 @@ class CameraPose(RandomizerBase):
             farthest_m,
         )  # fmt: skip
         fault = f"randomizers.{self.name}.fills: "
-        if high * _LENS_CHANGE < smallest:
+        if high * LENS_CHANGE < smallest:
             raise ConfigError(
                 f"{fault}at most {high:g} of the image of camera '{camera.name}', but the smallest "
                 f"object fills about {smallest:.2g} from the farthest place, {farthest_m:.3g} m "
                 "away; expected a larger share, a wider lens or a larger room"
             )
-        if low > _LENS_CHANGE * largest:
+        if low > LENS_CHANGE * largest:
             raise ConfigError(
                 f"{fault}at least {low:g} of the image of camera '{camera.name}', but the largest "
                 f"object fills about {largest:.2g} at the clearance_m of {self.clearance_m:g}; "

@@ -12,15 +12,13 @@ from gen_data.assets.family import Family
 from gen_data.assets.library import Library
 from gen_data.core import errors, interfaces, scene_time, stereo, streams
 from gen_data.core.scene import Camera, Region, Scene
-from gen_data.randomizers.camera_pose import CameraPose
+from gen_data.randomizers.camera_pose import LENS_CHANGE, CameraPose
 from gen_data.randomizers.rig_calibration import RigCalibration
 from gen_data.randomizers.room_path import RoomPath
 from gen_data.scene_templates.carrier import Carrier
 
 FIDUCIAL = "fiducial"
 """Tag of markers and calibration boards."""
-LENS_CHANGE = 2.0
-"""Largest factor by which randomizers are assumed to lengthen a lens."""
 PAIR_REMEDY = (
     "mount them on one rig with the same size, field of view, lens and angles, the right one "
     "beside the left, and vary neither alone by a randomizer"

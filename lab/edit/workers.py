@@ -258,11 +258,7 @@ class Workers:
         command = processes.tie([sys.executable, "-c", _START, self._scratch, *sys.path])
         with self._changed:
             with processes.interrupts_blocked():
-                child = subprocess.Popen(
-                    command,
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                )
+                child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
             self._children[number] = child
             if self._closed:
                 child.kill()
