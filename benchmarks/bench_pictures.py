@@ -6,13 +6,12 @@ projected 3D box, ``DontCare`` left out. Heights are in pixels of KITTI's camera
 721.5 px): pictures of our cameras are rendered small, since labels need few pixels. ``--light``
 adds the grey levels of people, at full size, which takes ten times as long.
 
-The column ``real`` was counted in KITTI's drives (Geiger et al., IJRR 2013); the camera's height
-above the ground below a car is that of its front-view drives.
+The column ``real`` is of ``street_figures.yaml``.
 """
 
 import argparse
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.real_figures import real_figures
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.capture import Channel
@@ -36,28 +36,7 @@ DARK = 25
 """Grey level below which a pixel counts as dark."""
 KINDS = {"Car": "cars", "Pedestrian": "people", "Cyclist": "cyclists"}
 
-REAL = {
-    **dict(zip([f"cars {b} px" for b in BINS], (0.53, 1.05, 0.84, 0.54, 0.06), strict=True)),
-    **dict(zip([f"people {b} px" for b in BINS], (0.0, 0.07, 0.17, 0.18, 0.04), strict=True)),
-    "cars": 3.02,
-    "people": 0.46,
-    "cyclists": 0.22,
-    "people: width / height, p10": 0.31,
-    "people: width / height, p50": 0.38,
-    "people: width / height, p90": 0.53,
-    "people: length, p50 [m]": 0.90,
-    "people: width, p50 [m]": 0.67,
-    "people: distance, p50 [m]": 17.0,
-    "cars: length, p5 [m]": 3.2,
-    "cars: length, p50 [m]": 3.88,
-    "cars: width, p50 [m]": 1.62,
-    "cars: width, p95 [m]": 1.79,
-    "cars: height, p50 [m]": 1.56,
-    "ground below cars, p5 [m]": 0.90,
-    "ground below cars, p95 [m]": 2.26,
-    "people: dark pixels": 0.26,
-    "people: mean grey": 73.0,
-}
+REAL = real_figures("pictures").rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +79,10 @@ class Picture:
     grey: tuple[int, ...] = ()
 
 
-def pictures_of_config(name: str, n: int, given: list[str], *, light: bool) -> Iterator[Picture]:
-    """Pictures of ``n`` scenes by the first camera, one step of each view."""
+def pictures_of_config(
+    name: str, scenes: Iterable[int], given: Sequence[str], *, light: bool
+) -> Iterator[list[Picture]]:
+    """Pictures of each of these scenes by the first camera, one step of each view."""
     config = load_config(name, overrides=given)
     camera = next(s for s in config.sensors if hasattr(s, "size_px"))
     shrunk = 1 if light else SHRUNK
@@ -118,7 +99,8 @@ def pictures_of_config(name: str, n: int, given: list[str], *, light: bool) -> I
     kitti = next((e for e in config.exporters if isinstance(e, Kitti)), Kitti(far_m=64))
     style = kitti.model_copy(update={"low_px": math.ceil(kitti.low_px / shrunk)})
     with open_pipeline(load_config(name, overrides=[*given, *changes])) as pipeline:
-        for scene in range(n):
+        for scene in scenes:
+            pictures = []
             accepted = pipeline.accepted_scene(scene)
             sensors = [s for s in accepted.sensors if s.name == camera.name]
             for number in range(config.general.views_per_scene):
@@ -128,7 +110,8 @@ def pictures_of_config(name: str, n: int, given: list[str], *, light: bool) -> I
                 pixels = sample.capture.readings[camera.name].channels
                 grey = _grey_of_people(truth, pixels) if light else ()
                 rows = [row for row, _ in label_rows(truth, style)]
-                yield _picture(rows, truth.camera.intrinsics.fx_px, grey)
+                pictures.append(_picture(rows, truth.camera.intrinsics.fx_px, grey))
+            yield pictures
 
 
 def _picture(rows: Sequence[str], focal_px: float, grey: tuple[int, ...] = ()) -> Picture:
@@ -194,8 +177,8 @@ def main() -> None:
     if arguments.kitti is not None:
         pictures = list(pictures_of_kitti(arguments.kitti, arguments.n))
     else:
-        given = (arguments.config, arguments.n, arguments.set)
-        pictures = list(pictures_of_config(*given, light=arguments.light))
+        given = (arguments.config, range(arguments.n), arguments.set)
+        pictures = [p for scene in pictures_of_config(*given, light=arguments.light) for p in scene]
     figures = summarise(pictures)
     print(f"{len(pictures)} pictures")
     print(f"{'':30} {'real':>8} {'here':>8}")

@@ -26,13 +26,14 @@ HDL-64E S2. Definitions, the same for all sources:
 
 import argparse
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.real_figures import real_figures
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.sample import Sample
@@ -50,31 +51,7 @@ KINDS = {"car": "car", "pedestrian": "pedestrian", "cyclist": "cyclist", "person
 HIGHEST = 0.995
 """Quantile of elevations that stands for the highest beam."""
 
-REAL = {
-    "points a sweep": 118_900.0,
-    "cells hit": 0.761,
-    "ground residual [mm]": 21.6,
-    "ground reflectance": 0.244,
-    "  its deviation": 0.097,
-    "reflectance of all points": 0.262,
-    "  95th percentile": 0.49,
-    "  zeros": 0.118,
-    "reflectance of cars": 0.161,
-    "reflectance of pedestrians": 0.343,
-    "reflectance of cyclists": 0.277,
-    "points on a car at 10 m": 1345.0,
-    "points on a car at 20 m": 210.0,
-    "points on a car at 40 m": 33.0,
-    "points on a pedestrian at 10 m": 262.0,
-    "points on a pedestrian at 20 m": 79.0,
-    "points on a pedestrian at 40 m": 24.0,
-    "points on a cyclist at 10 m": 546.0,
-    "points on a cyclist at 20 m": 107.0,
-    "points on a cyclist at 40 m": 21.0,
-    "range of 99.9 % [m]": 73.0,
-    "highest beam [deg]": 3.7,
-}
-"""Measured in scans of KITTI (Geiger et al., "Vision meets Robotics", IJRR 2013)."""
+REAL = real_figures("scans").rows
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -145,8 +122,10 @@ class Scan:
     boxes: tuple[ObjectBox, ...]
 
 
-def scans_of_config(name: str, n: int, overrides: list[str]) -> Iterator[Scan]:
-    """Scans of ``n`` scenes of a configuration, two of each; its cameras are made tiny.
+def scans_of_config(
+    name: str, scenes: Iterable[int], overrides: Sequence[str]
+) -> Iterator[list[Scan]]:
+    """Scans of each of these scenes, of their first and last step; cameras are made tiny.
 
     Building a scene takes most of the time; in its last step objects are at other ranges.
     """
@@ -158,9 +137,9 @@ def scans_of_config(name: str, n: int, overrides: list[str]) -> Iterator[Scan]:
         if hasattr(sensor, "size_px")
     ]
     with open_pipeline(load_config(name, overrides=[*overrides, *tiny])) as pipeline:
-        for scene in range(n):
-            for step in sorted({0, config.general.steps_per_scene - 1}):
-                yield scan_of_sample(pipeline.sample(scene * steps + step))
+        for scene in scenes:
+            ends = sorted({0, config.general.steps_per_scene - 1})
+            yield [scan_of_sample(pipeline.sample(scene * steps + step)) for step in ends]
 
 
 def scan_of_sample(sample: Sample) -> Scan:
@@ -314,7 +293,7 @@ def points_at(objects: Sequence[tuple[float, int]], range_m: float) -> tuple[flo
     return math.exp(float(n.mean()) + slope * ahead), error
 
 
-def summarise(scans: list[ScanFigures]) -> dict[str, tuple[float, float, float]]:
+def summarise(scans: Sequence[ScanFigures]) -> dict[str, tuple[float, float, float]]:
     """Figures of all scans together, by the names of ``REAL``; NaN where there is no object.
 
     Each is a value, its standard error as a share of it, and the value by the objects' own points;
@@ -378,7 +357,8 @@ def main() -> None:
         scans = scans_of_kitti(arguments.kitti, arguments.n)
     else:
         overrides = arguments.set or ["shared.weather=ClearNoon"]
-        scans = scans_of_config(arguments.config, arguments.n, overrides)
+        found = scans_of_config(arguments.config, range(arguments.n), overrides)
+        scans = (scan for scene in found for scan in scene)
     figures_of = [measure(scan) for scan in scans]
     figures = summarise(figures_of)
     kinds = [thing.kind for scan in figures_of for thing in scan.objects]
