@@ -7,6 +7,7 @@
     classes.json                                 names of the numbers in the grids
     occ3d/gts/<scene>/<token>/labels.npz         layout ``occ3d``
     surroundocc/<token>.npy                      layout ``surroundocc``
+    openoccupancy/scene_<token>/occupancy/<token of the scan>.npy    layout ``openoccupancy``
     semantickitti/sequences/00/voxels/000000.*   layout ``semantickitti``: bin, label, invalid,
                                                  occluded
 
@@ -22,6 +23,9 @@ their velocities along the axes of the frame.
   ``nuscenes``. Its grid is 200 x 200 x 16 from (-40, -40, -1) m.
 * **surroundocc**: rows ``x, y, z, class`` of voxels with a surface, int64 [n, 4], with the same
   classes. Its grid is 200 x 200 x 16 from (-50, -50, -5) m, 0.5 m each, in the scanner's frame.
+* **openoccupancy**: rows ``z, y, x, class`` of voxels with a surface, uint16 [n, 4], with the same
+  classes; its code ignores voxels of class 0. Tokens of scenes and scans agree with ``nuscenes``.
+  Its grid is 512 x 512 x 40 from (-51.2, -51.2, -5) m, 0.2 m each, in the scanner's frame.
 * **semantickitti**: flags of 8 voxels share a byte, the first one in its highest bit; ``label`` is
   uint16, 0 = free. ``bin``: voxels with a point of the scan. ``invalid``: interiors, which no scan
   can show.
@@ -31,9 +35,9 @@ their velocities along the axes of the frame.
 
 Other grids are written as they are; readers with fixed sizes need the ones above.
 
-References: Tian et al., "Occ3D", NeurIPS 2023; Wei et al., "SurroundOcc", ICCV 2023; Liu et al.,
-"OpenOcc" of the CVPR 2024 challenge on occupancy and flow; Behley et al., "SemanticKITTI", ICCV
-2019, and semantic-kitti-api.
+References: Tian et al., "Occ3D", NeurIPS 2023; Wei et al., "SurroundOcc", ICCV 2023; Wang et al.,
+"OpenOccupancy", ICCV 2023; Liu et al., "OpenOcc" of the CVPR 2024 challenge on occupancy and flow;
+Behley et al., "SemanticKITTI", ICCV 2019, and semantic-kitti-api.
 """
 
 from collections.abc import Iterable, Sequence
@@ -54,7 +58,7 @@ from gen_data.exporters import base, image_files, nuscenes_classes, point_cloud_
 from gen_data.exporters.conventions import ANY_LENS, SAMPLE, Conventions
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.npz import npy_bytes, npz_bytes
-from gen_data.exporters.nuscenes_recording import scene_name
+from gen_data.exporters.nuscenes_recording import LIDAR_TOP, scene_name
 from gen_data.exporters.nuscenes_tables import Tokens
 from gen_data.exporters.sensor_selection import has_scans, laser_scanner
 from gen_data.exporters.sequences import (
@@ -66,7 +70,7 @@ from gen_data.exporters.sequences import (
     write_text,
 )
 
-Layout = Literal["occ3d", "surroundocc", "semantickitti"]
+Layout = Literal["occ3d", "surroundocc", "openoccupancy", "semantickitti"]
 FREE = 17
 """Class of free voxels in Occ3D."""
 VOXEL = np.dtype([("instance_id", "<u2"), ("surface", "u1")])
@@ -78,7 +82,7 @@ PARTS = ("bin", "label", "invalid", "occluded")
 
 
 class OccupancyGrids(base.ExporterBase):
-    """Occupancy grids of all samples, also in the layouts of Occ3D, SurroundOcc, SemanticKITTI.
+    """Occupancy grids of all samples, also as Occ3D, SurroundOcc, OpenOccupancy, SemanticKITTI.
 
     Attributes:
         layouts: Further layouts.
@@ -125,8 +129,10 @@ class OccupancyGrids(base.ExporterBase):
         """Contents of the files of a sample by their ending."""
         velocities = grid.velocities_m_s(sample.scene.instances)
         files = {"npz": npz_bytes(_arrays(sample, grid, velocities), LEVEL)}
-        if {"occ3d", "surroundocc"} & set(self.layouts):
+        if {"occ3d", "surroundocc", "openoccupancy"} & set(self.layouts):
             classes = driving_classes(sample.scene, grid)
+            surface = grid.state == VOXEL_STATES.index("surface")
+            rows = np.column_stack([np.argwhere(surface), classes[surface]])
         if "occ3d" in self.layouts:
             labels = {
                 "semantics": classes,
@@ -136,9 +142,9 @@ class OccupancyGrids(base.ExporterBase):
             }
             files["occ3d"] = npz_bytes(labels, LEVEL)
         if "surroundocc" in self.layouts:
-            surface = grid.state == VOXEL_STATES.index("surface")
-            rows = np.column_stack([np.argwhere(surface), classes[surface]])
             files["surroundocc"] = npy_bytes(rows.astype("<i8"))
+        if "openoccupancy" in self.layouts:
+            files["openoccupancy"] = npy_bytes(rows[:, [2, 1, 0, 3]].astype("<u2"))
         lidar = laser_scanner(info, self.lidar, self.type)
         if "semantickitti" in self.layouts and has_scans(shard_dir, lidar, sample.index):
             points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
@@ -154,10 +160,13 @@ class OccupancyGrids(base.ExporterBase):
         for shard_dir, row in fragment_rows(shard_dirs, self.type, FRAMES):
             stem = shard_dir / self.type / f"{row['index']:09d}"
             key = token("sample", row["index"])
+            scene = token("scene", row["sequence"])
+            scan = token("sample_data", row["index"], LIDAR_TOP)
             targets = {
                 "npz": f"grids/{row['index']:09d}.npz",
                 "occ3d": f"occ3d/gts/{scene_name(row['sequence'])}/{key}/labels.npz",
                 "surroundocc": f"surroundocc/{key}.npy",
+                "openoccupancy": f"openoccupancy/scene_{scene}/occupancy/{scan}.npy",
             }
             for ending, target in targets.items():
                 if ending == "npz" or ending in self.layouts:

@@ -231,7 +231,7 @@ READERS: tuple[Reader, ...] = (
 
 WITHOUT_READER = {
     "culane": "its evaluation is in no registry: benchmarks.readers.evaluations",
-    "lidar_flow": "judged by av2 in benchmarks.readers.evaluations; FlowNet3D is in no registry",
+    "lidar_flow": "judged by av2 and FlowNet3D: benchmarks.readers.evaluations",
     "map_vectors": "its evaluation is in no registry: benchmarks.readers.evaluations",
     "opendrive": "our reader; ASAM's checker requires packages of its own (docs/maps.md)",
     "openlane": "its evaluation is in no registry: benchmarks.readers.evaluations",

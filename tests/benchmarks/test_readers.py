@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from benchmarks.readers.__main__ import DATA, HERE
+from benchmarks.readers.evaluations.definitions import definitions
 from benchmarks.readers.table import READERS, WITHOUT_READER
 from benchmarks.readers.views import Comparison, Thing, View, from_corner
 from gen_data.exporters import TABLE
@@ -86,3 +87,22 @@ def test_readers_find_what_data_sets_state() -> None:
 
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.count(" yes ") > 10
+
+
+def test_functions_of_an_evaluation_run_without_the_packages_that_its_file_imports(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "metric.py"
+    file.write_text(
+        "import a_framework\n"
+        "a_framework.start()\n"
+        "@a_framework.register\n"
+        "class Score:\n"
+        "    def of(self, x: a_framework.Tensor) -> float:\n"
+        "        return share(x)\n"
+        "def share(x):\n"
+        "    return np.mean(x > limit)\n"
+    )
+    score, share = definitions(file, "Score share", np=np, limit=2)
+
+    assert score().of(np.arange(4)) == share(np.arange(4)) == 0.25

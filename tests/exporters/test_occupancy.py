@@ -18,7 +18,7 @@ from gen_data.exporters.occupancy import OccupancyGrids
 from tests.exporters.drives import drive_info
 
 LOW_M, VOXEL_M, SHAPE = (0.0, -8.0, -2.4), 0.4, (64, 40, 16)
-EXPORTER = OccupancyGrids(layouts=("occ3d", "surroundocc", "semantickitti"))
+EXPORTER = OccupancyGrids(layouts=("occ3d", "surroundocc", "openoccupancy", "semantickitti"))
 CAR, PEDESTRIAN, ROAD, TERRAIN_FREE = 4, 7, 11, 17
 """Classes of Occ3D-nuScenes, from its page."""
 
@@ -141,6 +141,27 @@ def test_occ3d_has_nuscenes_classes_under_the_tokens_of_the_nuscenes_export(
     dense = np.full(SHAPE, TERRAIN_FREE)
     dense[tuple(rows[:, :3].T)] = rows[:, 3]
     assert (dense == np.where(grid.state == 1, expected, TERRAIN_FREE)).all()
+
+
+def test_openoccupancy_has_the_same_voxels_from_z_to_x_under_tokens_of_the_nuscenes_export(
+    world: Any, folder: Path, tmp_path: Path
+) -> None:
+    nuscenes = world.export(NuScenes(), drive_info(world), world.drive(), tmp_path / "nuscenes")
+    tables = nuscenes / "v1.0-mini"
+    scenes = {
+        s["token"]: s["scene_token"] for s in json.loads((tables / "sample.json").read_text())
+    }
+    scans = [
+        scan
+        for scan in json.loads((tables / "sample_data.json").read_text())
+        if scan["is_key_frame"] and "LIDAR_TOP" in scan["filename"]
+    ]
+    assert len(scans) > 1
+    for scan in scans:
+        sample = scan["sample_token"]
+        path = folder / f"openoccupancy/scene_{scenes[sample]}/occupancy/{scan['token']}.npy"
+        other = np.load(folder / f"surroundocc/{sample}.npy")
+        assert np.load(path)[:, [2, 1, 0, 3]].tolist() == other.tolist()
 
 
 def test_scene_completion_has_the_layout_of_semantickitti(
