@@ -40,19 +40,47 @@ def defocus(image: Float32, radius_px: Float32) -> Float32:
     pyramidal image processing", Eurographics 2007.
     """
     levels = np.asarray(_BLUR_LEVELS, np.float32)
-    level = np.searchsorted(0.5 * (levels[1:] + levels[:-1]), np.abs(radius_px))
+    level = np.searchsorted(0.5 * (levels[1:] + levels[:-1]), np.abs(radius_px)).astype(np.int8)
     signed = np.where(radius_px < 0.0, -level, level)
-    out = np.zeros_like(image)
-    weight = np.zeros(image.shape[:2], np.float32)
-    for layer in sorted(np.unique(signed).tolist(), reverse=True):
-        alpha = (signed == layer).astype(np.float32)
-        kernel = _disc(float(levels[abs(layer)]))
-        color = cv2.filter2D(image * alpha[..., None], -1, kernel, borderType=cv2.BORDER_REPLICATE)
-        cover = cv2.filter2D(alpha, -1, kernel, borderType=cv2.BORDER_REPLICATE)
-        cover = np.clip(cover, 0.0, 1.0)
-        out = color + out * (1.0 - cover)[..., None]
-        weight = cover + weight * (1.0 - cover)
-    return np.asarray(out / np.maximum(weight, 1e-4)[..., None], np.float32)
+    # Colour and, last, cover.
+    out = np.zeros((*image.shape[:2], 4), np.float32)
+    for layer in range(len(levels) - 1, -len(levels), -1):
+        own = signed == layer
+        if own.any():
+            radius = float(levels[abs(layer)])
+            place = _surroundings(own, math.ceil(radius))
+            _lay_over(out[place], _blurred_layer(image[place], own[place], radius))
+    red, green, blue, weight = cv2.split(out)
+    weight = np.maximum(weight, np.float32(1e-4))
+    blurred: Float32 = cv2.merge([red / weight, green / weight, blue / weight])
+    return blurred
+
+
+def _surroundings(mask: NDArray[np.bool_], reach_px: int) -> tuple[slice, slice]:
+    """Rows and columns of the rectangle around the set pixels of a mask, grown on all sides."""
+    spans = []
+    for axis in (1, 0):
+        used = np.flatnonzero(mask.any(axis=axis))
+        spans.append(slice(max(int(used[0]) - reach_px, 0), int(used[-1]) + 1 + reach_px))
+    return spans[0], spans[1]
+
+
+def _blurred_layer(image: Float32, own: NDArray[np.bool_], radius_px: float) -> Float32:
+    """The pixels of a mask, blurred: colour times cover, and cover in [0, 1], [h, w, 4]."""
+    alpha = own.astype(np.float32)
+    layer: Float32 = cv2.merge([*(channel * alpha for channel in cv2.split(image)), alpha])
+    if radius_px > 0.0:
+        layer = cv2.filter2D(layer, -1, _disc(radius_px), borderType=cv2.BORDER_REPLICATE)
+        np.clip(layer[..., 3], 0.0, 1.0, out=layer[..., 3])
+    return layer
+
+
+def _lay_over(below: Float32, layer: Float32) -> None:
+    """Lay a layer [h, w, 4] over what is below it, in place."""
+    clear = np.float32(1.0) - layer[..., 3]
+    # Merged first, as in scale_pixels.
+    below *= cv2.merge([clear, clear, clear, clear])
+    below += layer
 
 
 def apply_vignetting(image: Float32, corner_loss: float) -> Float32:

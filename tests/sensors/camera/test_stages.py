@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from scipy import stats
+from scipy import ndimage, stats
 
 from gen_data.config.distributions import Constant
 from gen_data.core.intrinsics import Intrinsics
@@ -299,6 +299,28 @@ def test_what_is_in_focus_stays_and_what_is_not_spreads_without_bleeding() -> No
     soft = optics.defocus(image, radius)
     assert soft[20, 10, 0] == pytest.approx(1.0)
     assert soft[20, 25, 0] < 0.05
+
+
+def test_layers_out_of_focus_are_those_of_whole_images_laid_over_one_another() -> None:
+    """Each is blurred alone, far ones first, also at the borders; by SciPy's direct correlation."""
+    rng = Rng(np.random.PCG64(5))
+    image = rng.random((30, 44, 3)).astype(np.float32)
+    radius = np.zeros((30, 44), np.float32)
+    radius[:12, :9], radius[8:25, 30:41], radius[20:, 5:12] = 2.5, 1.6, -1.0
+    total, weight = np.zeros(image.shape), np.zeros(radius.shape)
+    y, x = np.mgrid[-3:4, -3:4]
+    for blur in (2.5, 1.6, 0.0, -1.0):
+        alpha = (radius == np.float32(blur)).astype(float)
+        disc = np.clip(abs(blur) + 0.5 - np.hypot(x, y), 0.0, 1.0)
+        spread = [
+            ndimage.correlate(alpha * plane, disc / disc.sum(), mode="nearest")
+            for plane in (*np.moveaxis(image, 2, 0), np.ones(radius.shape))
+        ]
+        total = np.stack(spread[:3], axis=2) + total * (1.0 - spread[3])[..., None]
+        weight = spread[3] + weight * (1.0 - spread[3])
+    np.testing.assert_allclose(
+        optics.defocus(image, radius), total / weight[..., None], rtol=1e-4, atol=1e-6
+    )
 
 
 def test_exposure_is_reached_by_time_before_gain() -> None:
