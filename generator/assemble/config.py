@@ -429,7 +429,9 @@ class _Known:
 
         def resolve_item(number: str | int, item: Node) -> Node:
             if id(item) not in self.names:
-                self.names[id(item)] = sorted(shared_values.names_in(item))
+                self.names[id(item)] = _NAMES.get(
+                    item, lambda: sorted(shared_values.names_in(item))
+                )
             # As text: 1, 1.0 and true are equal, but not the same value.
             place = id(item), repr([shared.get(name) for name in self.names[id(item)]])
             if place not in self.items:
@@ -448,6 +450,8 @@ class _Known:
         return plugin
 
 
+_NAMES: bounded_cache.ObjectCache[list[str]] = bounded_cache.ObjectCache(512)
+"""Names of the shared values that the latest items depend on: inherited ones are met again."""
 _CONSTANT_PARTS: bounded_cache.ObjectCache[_Known] = bounded_cache.ObjectCache(4)
 """Parts of the latest documents that do not depend on shared values."""
 

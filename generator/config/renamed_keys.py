@@ -14,6 +14,7 @@ from gen_data.config import data_files, merging, paths
 from gen_data.config.problems import FieldPath, Position, Problem, Problems, format_path, refuse
 from gen_data.config.shared_values import SWITCH
 from gen_data.config.yaml_tree import Node
+from gen_data.core.bounded_cache import ObjectCache
 
 Words = Mapping[str, str]
 """Current words by deprecated ones."""
@@ -78,11 +79,26 @@ def refuse_moved_keys(document: Node) -> None:
     problems.raise_if_any()
 
 
+_CURRENT: ObjectCache[set[str]] = ObjectCache(1024)
+"""Sections in which the latest items have no deprecated word: inherited ones are met again."""
+
+
 def _replace_in_section(node: Node, section: str) -> Node:
-    node = _rename_selections(node, (section,))
-    if section == "shared":
-        return node
-    return node.with_children(lambda part, item: _rename_plugin(item, section, (section, part)))
+    if "given" in node.entries:
+        node = _rename_keys(node, (section,), SELECTIONS)
+    return node.with_children(lambda part, item: _replace_in_item(item, section, part))
+
+
+def _replace_in_item(item: Node, section: str, part: str | int) -> Node:
+    current = _CURRENT.get(item, set)
+    if section in current:
+        return item
+    renamed = _rename_selections(item, (section, part))
+    if section != "shared":
+        renamed = _rename_plugin(renamed, section, (section, part))
+    if renamed is item:
+        current.add(section)
+    return renamed
 
 
 def _rename_selections(node: Node, path: FieldPath) -> Node:

@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
+from operator import is_
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -93,12 +94,17 @@ class Node:
         return dict(enumerate(self.items)) | dict(self.entries)
 
     def with_children(self, change: Callable[[str | int, Node], Node]) -> Node:
-        """The same list or mapping with changed values; a scalar stays as it is."""
+        """The same list or mapping with changed values; this node if none has changed."""
+        content: tuple[Node, ...] | Mapping[str, Node]
         if isinstance(self.content, tuple):
-            return replace(self, content=tuple(change(k, n) for k, n in enumerate(self.content)))
-        if isinstance(self.content, Mapping):
-            return replace(self, content={k: change(k, n) for k, n in self.content.items()})
-        return self
+            content = tuple([change(k, n) for k, n in enumerate(self.content)])
+        elif isinstance(self.content, Mapping):
+            content = {k: change(k, n) for k, n in self.content.items()}
+        else:
+            return self
+        old = self.content.values() if isinstance(self.content, Mapping) else self.content
+        new = content.values() if isinstance(content, Mapping) else content
+        return self if all(map(is_, old, new)) else replace(self, content=content)
 
     def get(self, *path: str | int) -> Node | None:
         """The node at the end of a path of keys and indices, or None if there is none."""

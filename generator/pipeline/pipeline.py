@@ -344,12 +344,16 @@ class Pipeline:
                 interfaces.Stage.VIEW,
                 streams,
             )
-            finished = finish_view(scene, self.assets, self._category_ids, self._lifted)
-            self._lifted = None if scene.relief is None else (scene, finished)
-            return DrawnView(number, finished, streams)
+            return DrawnView(number, self._finish(scene), streams)
 
         self._view = self._first_accepted(accepted.index, draw)
         return self._view
+
+    def _finish(self, scene: Scene) -> Scene:
+        """The scene of a view as it was drawn, ready for sensors."""
+        finished = finish_view(scene, self.assets, self._category_ids, self._lifted)
+        self._lifted = None if scene.relief is None else (scene, finished)
+        return finished
 
     def _randomize(
         self,

@@ -76,12 +76,17 @@ class Desk:
             self.loop.call_soon_threadsafe(hearer, activity)
 
     def order(
-        self, client: str, jobs: Sequence[Job], receive: Callable[[Ticket, Any], None]
+        self,
+        client: str,
+        jobs: Sequence[Job],
+        receive: Callable[[Ticket, Any], None],
+        *,
+        later: bool = False,
     ) -> None:
-        """Replace the jobs of a client; their results go to ``receive``."""
+        """Replace the jobs of a client; their results go to ``receive``, ``later`` than others."""
         self.listeners[client] = receive
         assert self.workers is not None
-        self.workers.submit(client, jobs)
+        self.workers.submit(client, jobs, later=later)
 
     def forget(self, key: str) -> None:
         """Drop the jobs of all clients of a tab."""

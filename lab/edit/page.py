@@ -300,7 +300,7 @@ class EditorTab:
         self.desk.order(self.key, orders, self._receive)
         # A text with faults has nothing else to check.
         checks = [Check(orders[0].text, orders[0].file)] if orders else []
-        self.desk.order(f"{self.key}/check", checks, self._receive_check)
+        self.desk.order(f"{self.key}/check", checks, self._receive_check, later=True)
         self._orders = orders or self._orders
         if not orders:
             self._busy.text = ""

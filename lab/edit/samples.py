@@ -6,10 +6,12 @@ fewer pixels: every thumbnail shows the sample that the run will contain.
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,13 +47,16 @@ if TYPE_CHECKING:
     from gen_data.core.sample import Sample
     from gen_data.core.scene import Scene
     from gen_data.core.streams import Rng, Streams
+    from gen_data.physics.physics_config import PhysicsConfig
     from gen_data.pipeline.pipeline import AcceptedScene
     from gen_data.preview.overlay import Image
 
 TEXTS_KEPT = 4
 """Latest texts whose pipelines are kept: variants of one field share most of their assets."""
-RENDERERS_KEPT = 2
-"""Renderers of the latest settings: each holds some tens of megabytes of assets."""
+ENGINES_KEPT = 2
+"""Renderers and physics engines of the latest settings: some tens of megabytes of assets each."""
+SCENES_KEPT = 12
+"""Packed scenes: a grid of 24 has as many for each of two processes."""
 SAMPLES_KEPT = 32
 """Latest small samples, on which other labels are drawn without rendering."""
 DRAWS_MAX = 300
@@ -158,11 +163,49 @@ class Taken:
     factor: float
 
 
+@dataclass
+class Kept:
+    """Assets, engines and scenes that stay from text to text: opening takes longer than a sample.
+
+    Attributes:
+        engines: Of physics, by settings; one of pybullet is a connection, of which a process has
+            at most 1024.
+    """
+
+    library: Library
+    renderers: CountCache[Renderer] = field(default_factory=lambda: CountCache(ENGINES_KEPT))
+    engines: CountCache[RememberingPhysics] = field(
+        default_factory=lambda: CountCache(ENGINES_KEPT)
+    )
+    memory: Memory = field(default_factory=Memory)
+
+    def renderer(self, settings: str, make: Callable[[], Renderer]) -> Renderer:
+        """The renderer of some settings, which keeps the scenes of a grid."""
+
+        def opened() -> Renderer:
+            from gen_data.renderers.warp.renderer import WarpRenderer
+
+            renderer = make()
+            if isinstance(renderer, WarpRenderer):
+                renderer.keep_scenes(SCENES_KEPT)
+            return renderer
+
+        return self.renderers.get(settings, opened)
+
+    def physics(self, settings: PhysicsConfig) -> RememberingPhysics:
+        """The physics engine of some settings."""
+        text = repr(settings)
+        return self.engines.get(
+            text,
+            lambda: RememberingPhysics(open_engine(self.library, settings), text, self.memory),
+        )
+
+
 class Studio:
     """Renders orders in one process; keeps assets, engines, pipelines and the latest samples."""
 
     def __init__(self) -> None:
-        self._libraries: CountCache[tuple[Library, CountCache[Renderer], Memory]] = CountCache(2)
+        self._libraries: CountCache[Kept] = CountCache(2)
         self._opened: CountCache[OpenedText] = CountCache(TEXTS_KEPT)
         self._taken: CountCache[Taken] = CountCache(SAMPLES_KEPT)
 
@@ -226,10 +269,8 @@ class Studio:
         )
         folders = config.asset_folders
         opened = repr([(folder, _index_time_ns(folder)) for folder in folders])
-        library, renderers, memory = self._libraries.get(
-            opened, lambda: (open_assets(folders), CountCache(RENDERERS_KEPT), Memory())
-        )
-        return OpenedText(config, library, renderers, memory)
+        kept = self._libraries.get(opened, lambda: Kept(open_assets(folders)))
+        return OpenedText(config, kept)
 
 
 def _index_time_ns(folder: Path) -> int:
@@ -247,26 +288,24 @@ class OpenedText:
         sensors: First kind of picture by name of every sensor that has one.
     """
 
-    def __init__(
-        self, config: Config, library: Library, renderers: CountCache[Renderer], memory: Memory
-    ) -> None:
+    def __init__(self, config: Config, kept: Kept) -> None:
         # Formats have no pictures: whether they can hold the data set is checked before a run.
         factory = PipelineFactory(replace(config, exporters=()), n=1)
-        # Assets stay open from text to text, and in the renderer: both take longer than a sample.
-        vars(factory)["library"] = library
-        vars(factory)["renderer"] = renderers.get(repr(config.render), lambda: factory.renderer)
+        vars(factory)["library"] = library = kept.library
+        renderer = kept.renderer(repr(config.render), lambda: factory.renderer)
+        vars(factory)["renderer"] = renderer
         self._config, self.library = config, library
         self._draws: dict[str, list[Draw]] = {}
-        settings = config.general.physics
-        self._memory, self._nominal = memory, factory.nominal
-        self._physics = RememberingPhysics(open_engine(library, settings), repr(settings), memory)
+        self._memory, self._nominal = kept.memory, factory.nominal
+        self._physics = kept.physics(config.general.physics)
         self._settings = pipeline_config(config, library, 1, factory.categories, frozenset())
-        self._pipeline = Pipeline(
+        self._pipeline = RememberingPipeline(
             self._settings,
             library,
             open_physics=lambda: self._physics,
-            open_renderer=lambda: factory.renderer,
+            open_renderer=lambda: renderer,
         )
+        self._pipeline.memory = kept.memory
         # Everything that a nominal scene depends on, and some more.
         apart = ("randomizers", "annotations", "exporters", "render")
         self._frame = repr({k: v for k, v in config.document.plain().items() if k not in apart})
@@ -372,11 +411,18 @@ class OpenedText:
         nominal = self._memory.get(
             self.library,
             (self._frame, repr(shared)),
-            lambda: built.get(id(scene)) or nominal_scene(config, scene, self.library),
+            lambda: self._known_nominal(
+                built.get(id(scene)) or nominal_scene(config, scene, self.library)
+            ),
         )
         self._draws["shared"] = list(shared_draws(config, nominal))
         observed = [Observed(one, self._draws, self._memory) for one in scene.randomizers]
         return nominal, observed, scene.sensors
+
+    def _known_nominal(self, nominal: Scene) -> Scene:
+        """The same scene as an earlier text had it, as after a change of an exposure or a label."""
+        content = hashlib.sha256(pickle.dumps(nominal)).digest()
+        return self._memory.get(self.library, ("nominal", content), lambda: nominal)
 
     def _plain_draws(self) -> dict[str, tuple[Any, ...]]:
         found: dict[str, list[Any]] = {}
@@ -384,6 +430,18 @@ class OpenedText:
             if not isinstance(distribution, Constant):
                 found.setdefault(name, []).append(to_plain_yaml(value))
         return {name: tuple(values) for name, values in list(found.items())[:DRAWS_MAX]}
+
+
+class RememberingPipeline(Pipeline):
+    """A pipeline that finishes no view twice."""
+
+    memory: Memory
+
+    def _finish(self, scene: Scene) -> Scene:
+        settings = ("view", self.info.categories)
+        return self.memory.get(
+            scene, settings, lambda: super(RememberingPipeline, self)._finish(scene)
+        )
 
 
 class Observed:

@@ -107,13 +107,19 @@ class Activity:
 
 @dataclass
 class Queue:
-    """Waiting jobs by tab; tabs take turns."""
+    """Waiting jobs by tab; tabs take turns.
+
+    Attributes:
+        later: Clients whose jobs wait for those of all others.
+    """
 
     waiting: OrderedDict[str, deque[Ticket]] = field(default_factory=OrderedDict)
     current: dict[str, frozenset[Ticket]] = field(default_factory=dict)
+    later: set[str] = field(default_factory=set)
 
-    def replace(self, client: str, tickets: Sequence[Ticket]) -> None:
+    def replace(self, client: str, tickets: Sequence[Ticket], *, later: bool = False) -> None:
         """Replace all jobs of a client; those that run are outdated then."""
+        (self.later.add if later and tickets else self.later.discard)(client)
         self.current[client] = frozenset(tickets)
         self.waiting.pop(client, None)
         if tickets:
@@ -127,10 +133,15 @@ class Queue:
         self.waiting.setdefault(ticket.client, deque()).appendleft(again)
 
     def take(self) -> Ticket | None:
-        """The next job, of the client that was served longest ago; None if none waits."""
+        """The next job, of the client that was served longest ago; None if none waits.
+
+        Those of ``later`` are last.
+        """
         if not self.waiting:
             return None
-        client, tickets = self.waiting.popitem(last=False)
+        soon = (name for name in self.waiting if name not in self.later)
+        client = next(soon, next(iter(self.waiting)))
+        tickets = self.waiting.pop(client)
         ticket = tickets.popleft()
         if tickets:
             self.waiting[client] = tickets
@@ -187,10 +198,17 @@ class Workers:
         for thread in self._threads:
             thread.join(5.0)
 
-    def submit(self, client: str, jobs: Sequence[Job]) -> None:
-        """Replace all jobs of a client by new ones; none forgets the client."""
+    def submit(self, client: str, jobs: Sequence[Job], *, later: bool = False) -> None:
+        """Replace all jobs of a client by new ones; none forgets the client.
+
+        Args:
+            client: Key of a tab, or of one of its tasks.
+            jobs: In their order.
+            later: They wait for the jobs of all other clients.
+        """
         with self._changed:
-            self._queue.replace(client, [Ticket(client, k, job) for k, job in enumerate(jobs)])
+            tickets = [Ticket(client, k, job) for k, job in enumerate(jobs)]
+            self._queue.replace(client, tickets, later=later)
             outdated = [r for r in self._running.values() if not self._queue.is_current(r[0])]
             self._changed.notify_all()
         for ticket, child in outdated:

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gen_data.config.problems import Position
-from gen_data.config.yaml_tree import load_yaml, parse_yaml
+from gen_data.config.yaml_tree import Node, load_yaml, parse_yaml
 from gen_data.core.errors import ConfigError
 from tests.config.messages import told
 
@@ -47,6 +47,20 @@ def test_a_document_becomes_plain_data_and_paths_to_nowhere_give_none() -> None:
     for path in [("x",), ("seed", "x"), ("randomizers", 2), ("randomizers", "a"), ("camera", 0)]:
         assert document.get(*path) is None
     assert document.get("randomizers", -1) is None
+
+
+def test_a_document_in_which_nothing_changes_stays_the_same_object() -> None:
+    """Caches know nodes by identity: one that changes is new, and so are those above it."""
+    document = parse_yaml(TABLETOP, "t.yaml")
+    assert document.with_children(lambda _, node: node) is document
+
+    def change(part: str | int, node: Node) -> Node:
+        return Node(node.position, 8) if part == "seed" else node
+
+    changed = document.with_children(change)
+    assert changed.plain() == {**document.plain(), "seed": 8}
+    assert changed.get("randomizers") is document.get("randomizers")
+    assert document.plain()["seed"] == 7
 
 
 @pytest.mark.parametrize(

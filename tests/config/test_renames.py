@@ -57,6 +57,17 @@ def test_old_words_mean_the_new_ones_and_a_warning_names_place_and_new_word() ->
     assert any(m.startswith("old.yaml:9:51: sensors[0].lens.model: 'published'") for m in messages)
 
 
+def test_old_words_are_told_as_often_as_a_document_is_read() -> None:
+    """Only items without any are not searched again."""
+    document = parse_yaml(OLD, "old.yaml")
+    for _ in range(2):
+        with pytest.warns(FutureWarning) as caught:
+            current = replace_old_words(document)
+        assert len(caught) == 19
+    assert replace_old_words(current) is current
+    assert replace_old_words(current).plain() == parse_yaml(NEW, "new.yaml").plain()
+
+
 def test_current_words_and_plans_of_older_data_sets_are_read_in_silence() -> None:
     """Nobody is meant to edit a plan."""
     document = parse_yaml(NEW, "new.yaml")

@@ -81,6 +81,20 @@ def test_tabs_take_turns() -> None:
     assert order == ["a", "b", "a", "b", "a"]
 
 
+def test_a_check_waits_for_the_pictures_of_all_tabs() -> None:
+    """Also for those that are ordered after it; a tab that is forgotten may order at once again."""
+    queue = Queue()
+    queue.replace("a/check", tickets("a/check", 1), later=True)
+    queue.replace("a", tickets("a", 2))
+    queue.replace("b", tickets("b", 1))
+    order = [ticket.client for ticket in iter(queue.take, None)]
+    assert order == ["a", "b", "a", "a/check"]
+    queue.replace("a/check", [])
+    queue.replace("a/check", tickets("a/check", 1))
+    queue.replace("a", tickets("a", 1))
+    assert [ticket.client for ticket in iter(queue.take, None)] == ["a/check", "a"]
+
+
 def test_a_job_whose_process_crashed_comes_first_again() -> None:
     """It stays current under its new ticket."""
     queue = Queue()

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from gen_data.api.dataset import Dataset
+from gen_data.lab.edit import samples
 from gen_data.lab.edit.overlays import View
 from gen_data.lab.edit.samples import Order, Studio
+from gen_data.physics import open_engine
+from gen_data.physics.engine import Engine
+from gen_data.report.drawn_parameters import observe_randomizer
 
 CONFIG = {
     "extends": "tabletop.yaml",
@@ -43,6 +48,54 @@ def test_a_changed_text_has_the_pictures_of_a_new_process() -> None:
         assert drawn[-1] == anew.jpeg
         assert studio.show(Order(text, "x.yaml", 1, View())).draws == anew.draws
     assert len(set(drawn)) == len(drawn)
+
+
+@pytest.mark.slow
+def test_scenes_stay_when_only_a_camera_develops_differently(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No randomizer draws again for an exposure or a limit of labels, in any of two streets.
+
+    Pictures are those of a new process, and one physics engine serves all texts of its settings.
+    """
+    drawn: list[str] = []
+    opened: list[Engine] = []
+
+    def spy(randomizer: Any, log: Any) -> Any:
+        drawn.append(randomizer.name)
+        return observe_randomizer(randomizer, log)
+
+    def spy_on_engines(*arguments: Any) -> Engine:
+        opened.append(open_engine(*arguments))
+        return opened[-1]
+
+    monkeypatch.setattr(f"{samples.__name__}.observe_randomizer", spy)
+    monkeypatch.setattr(f"{samples.__name__}.open_engine", spy_on_engines)
+    text = (
+        "extends: street.yaml\n"
+        "sensors: [{name: color, image_pipeline: {exposure_compensation_ev: 0}}]\n"
+        "labels: {min_visible_px: 16}\n"
+    )
+    studio = Studio()
+    for index in (0, 5):
+        studio.show(Order(text, "x.yaml", index, View()))
+    assert drawn.count("buildings") == 2
+    count = len(opened)
+    for old, new in (("ev: 0", "ev: 1"), ("min_visible_px: 16", "min_visible_px: 900")):
+        drawn.clear()
+        text = text.replace(old, new)
+        shown = [studio.show(Order(text, "x.yaml", index, View())) for index in (0, 5, 0)]
+        assert drawn == []
+        for one in shown:
+            anew = Studio().show(Order(text, "x.yaml", one.index, View()))
+            assert (one.jpeg, one.draws) == (anew.jpeg, anew.draws)
+        count += 3
+    drawn.clear()
+    studio.show(
+        Order(text.replace("name: color", "name: color, hfov_deg: 70"), "x.yaml", 0, View())
+    )
+    assert drawn.count("buildings") == 1
+    assert len(opened) == count  # One of each new process.
 
 
 @pytest.mark.slow

@@ -64,6 +64,14 @@ class WarpRenderer:
             tracer = PathTracer(self._cache, self._settings)
             self._context = replace(self._context, paths=tracer)
 
+    def keep_scenes(self, count: int) -> None:
+        """Keep packed scenes for a program that renders several in turn; a run has one at a time.
+
+        Args:
+            count: The latest ones; each holds some megabytes, and its assets.
+        """
+        self._cache.keep_scenes(count)
+
     def prepare_asset(self, asset_id: str) -> None:
         """See ``AssetPreparation``: hierarchies of meshes, levels of textures."""
         self._cache.prepare(asset_id)

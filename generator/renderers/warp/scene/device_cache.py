@@ -95,6 +95,11 @@ class DeviceCache:
         self._constants: dict[tuple[object, ...], wp.array] = {}
         self._latest: dict[str, list[_Latest]] = {}
 
+    def keep_scenes(self, count: int) -> None:
+        """Keep the packed data of that many of the latest scenes instead of one."""
+        self.bodies, self.body_materials = ObjectCache(count), ObjectCache(count)
+        self.scenes = ObjectCache(count)
+
     def mesh(self, asset_id: str) -> device_assets.DeviceMesh:
         """Geometry of an asset on the device."""
 
