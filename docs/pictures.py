@@ -3,6 +3,7 @@
     python docs/pictures.py                          # all; PICTURES_PROCESSES=2
     python docs/pictures.py randomizer/lighting      # those of one plug-in
     python docs/pictures.py configuration            # the gallery
+    python docs/pictures.py ladder                   # ladders of the gallery
     python docs/pictures.py tutorial                 # results of the tutorials
     python docs/pictures.py --missing                # those without a file
 
@@ -43,6 +44,7 @@ TABLE = DOCS / "pictures.yaml"
 WITHOUT_PICTURE = "no picture because "
 MISSING = "--missing"
 DISTRIBUTION, CONFIGURATION, TUTORIAL = "distribution", "configuration", "tutorial"
+LADDER = "ladder"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"# ([\w./-]+\.(?:py|toml|yaml))\n")
 WIDTH_PX, HEIGHT_PX = 320, 240
@@ -104,6 +106,7 @@ class Sheet(Strict):
         labels: Whether to draw the labels.
         tile_px: Width of a picture.
         channels: Channels to show; ``written`` = those of every sensor.
+        quality: Of the file.
         set_too: Values by path.
     """
 
@@ -115,6 +118,7 @@ class Sheet(Strict):
     labels: bool = True
     tile_px: int = 320
     channels: str = "rgb"
+    quality: int = Field(QUALITY, ge=1, le=100)
     set_too: dict[str, Any] = Field(default_factory=dict)
 
 
@@ -162,16 +166,25 @@ def read_rows() -> tuple[Row, ...]:
     """
     rows = []
     for kind, entries in _table().items():
-        if kind in (CONFIGURATION, TUTORIAL):
+        if kind in (CONFIGURATION, TUTORIAL, LADDER):
             continue
         for name, entry in entries.items():
             if isinstance(entry, str) and not entry.startswith(WITHOUT_PICTURE):
                 raise ValueError(f"{TABLE}: {kind}.{name}: expected '{WITHOUT_PICTURE}...'")
             listed = () if isinstance(entry, str) else entry
             reason = entry if isinstance(entry, str) else ""
-            strips = tuple(Strip.model_validate_json(json.dumps(strip)) for strip in listed)
-            rows.append(Row(kind, name, strips, reason))
+            rows.append(Row(kind, name, tuple(map(_read_strip, listed)), reason))
     return tuple(rows)
+
+
+@cache
+def read_ladders() -> Mapping[str, Strip]:
+    """Strips of the gallery's ladders by name."""
+    return {name: _read_strip(entry) for name, entry in _table()[LADDER].items()}
+
+
+def _read_strip(entry: Any) -> Strip:
+    return Strip.model_validate_json(json.dumps(entry))
 
 
 @cache
@@ -184,6 +197,7 @@ def read_sheets(kind: str = CONFIGURATION) -> Mapping[str, Sheet]:
 def find_jobs(words: Sequence[str] = ()) -> Iterator[Job]:
     """Files to draw: all, or those of some kinds or plug-ins (``kind/name``)."""
     jobs = [Job(row.kind, row.name, strip) for row in read_rows() for strip in row.strips]
+    jobs += [Job(LADDER, name, strip) for name, strip in read_ladders().items()]
     for kind in (CONFIGURATION, TUTORIAL):
         jobs += [Job(kind, name, sheet) for name, sheet in read_sheets(kind).items()]
     for job in jobs:
@@ -208,7 +222,8 @@ def draw(job: Job) -> Path:
         tiles = _render_strip(entry)
         picture = _join(tiles, entry.captions or [f"{entry.name}: {value}" for value in values])
     job.path.parent.mkdir(parents=True, exist_ok=True)
-    picture.save(job.path, quality=QUALITY, method=6)
+    quality = entry.quality if isinstance(entry, Sheet) else QUALITY
+    picture.save(job.path, quality=quality, method=6)
     return job.path
 
 

@@ -34,6 +34,17 @@ def color_ids(ids: NDArray[np.integer]) -> UInt8:
     return colored
 
 
+def color_positions(position_m: NDArray[np.floating]) -> UInt8:
+    """Convert positions [h, w, 3] to red, green and blue, uint8 [h, w, 3]; black = NaN."""
+    seen = np.isfinite(position_m).all(axis=-1)
+    colors = np.zeros(position_m.shape, np.uint8)
+    if seen.any():
+        low, high = np.quantile(position_m[seen], [0.01, 0.99], axis=0)
+        share = (position_m[seen] - low) / np.maximum(high - low, 1e-6)
+        colors[seen] = np.clip(40 + 215 * share, 40, 255).astype(np.uint8)
+    return colors
+
+
 @cache
 def voc_palette() -> UInt8:
     """The colours of Pascal VOC's label images, RGB, uint8 [256, 3], read-only; 0 is black.

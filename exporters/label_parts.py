@@ -1,4 +1,7 @@
-"""Parts of labels that recordings and pictures show: borders of lanes, tracked points, voxels."""
+"""Parts of labels that recordings and pictures show.
+
+Borders of lanes, tracked points, voxels, points in mirrors, and the delivery of readings.
+"""
 
 from collections.abc import Iterator, Mapping
 from itertools import groupby, pairwise
@@ -6,8 +9,10 @@ from itertools import groupby, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import se3
+from gen_data.core import reported, se3
 from gen_data.core.asset_types import SURFACES
+from gen_data.core.capture import PointCloud, SensorReading
+from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import (
     TRACK_STATES,
     VOXEL_STATES,
@@ -16,7 +21,14 @@ from gen_data.core.sample import (
     SensorTracks,
 )
 from gen_data.core.scene import Scene
-from gen_data.exporters.label_colors import SURFACE_COLORS, UNLABELLED, Rgb, id_color
+from gen_data.exporters.label_colors import (
+    SURFACE_COLORS,
+    UNLABELLED,
+    Rgb,
+    UInt8,
+    color_positions,
+    id_color,
+)
 
 LIFT_M = 0.05
 """Height of trajectories above the path of a body's origin, and of lanes above the ground."""
@@ -30,6 +42,8 @@ BORDER_COLORS: Mapping[str, Rgb] = {
 """By kind: between lanes of one direction, between directions, edges of the carriageway."""
 HIDDEN = 0.5
 """Brightness of hidden parts."""
+MIRROR_STEP_PX = 4
+"""Distance of the pixels whose points in mirrors are shown in space."""
 
 _Points = tuple[tuple[float, float], ...]
 
@@ -88,3 +102,34 @@ def surface_voxels(
     """Centres in the frame [m], [n, 3], and colours, uint8 [n, 3], of voxels with a surface."""
     shown = grid.state == VOXEL_STATES.index("surface")
     return grid.centers_m(np.argwhere(shown)), voxel_colors(grid, categories)[shown]
+
+
+def mirrored_points(position_m: NDArray[np.float32]) -> tuple[NDArray[np.float32], UInt8]:
+    """Points that mirrors show, of every fourth pixel of every fourth row.
+
+    ``position_m`` is the channel ``mirrored_position`` [h, w, 3].
+
+    Returns:
+        Places in the world frame [m], [n, 3], and the colours of their pixels in the coloured
+        channel, uint8 [n, 3].
+    """
+    thinned = np.s_[MIRROR_STEP_PX // 2 :: MIRROR_STEP_PX, MIRROR_STEP_PX // 2 :: MIRROR_STEP_PX]
+    places_m, colors = position_m[thinned], color_positions(position_m)[thinned]
+    seen = np.isfinite(places_m).all(axis=-1)
+    return places_m[seen], colors[seen]
+
+
+def delivery(
+    info: DatasetInfo, name: str, reading: SensorReading | PointCloud
+) -> tuple[int, float] | None:
+    """How often an image or scan arrives, and how late [s].
+
+    A sensor that may lose or double readings has numbers for all of them, 1 and 0.0 for most; else
+    None unless the reading has a record of its delivery.
+    """
+    faults = {fault for sensor in info.sensors if sensor.name == name for fault in sensor.faults}
+    if not {"lost", "doubled"} & faults and reported.DELIVERY not in reading.faults:
+        return None
+    copies = reported.copies(reading)
+    late_s = reported.arrived_s(reading) - reading.time_s if copies else 0.0
+    return copies, round(late_s, 9)

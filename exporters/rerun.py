@@ -50,6 +50,7 @@ from gen_data.exporters import (
     base,
     image_files,
     label_colors,
+    label_parts,
     point_cloud_io,
     rerun_labels,
     rrd_container,
@@ -136,6 +137,7 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         "cameras": {
             name: {
                 "time_s": round(begins_s + sample.capture.readings[name].time_s, 9),
+                **_delivery_row(info, name, sample.capture.readings[name]),
                 **_image_row(sample, name),
                 **rerun_labels.image_row(
                     sample.truth[name], None if tracks is None else tracks.sensors.get(name)
@@ -147,12 +149,20 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         "lidars": {
             name: {
                 "time_s": round(begins_s + cloud.time_s, 9),
+                **_delivery_row(info, name, cloud),
                 "pose": _pose(cloud.lidar.T_world_lidar),
             }
             for name, cloud in sorted(sample.capture.clouds.items())
         },
         **rerun_labels.frame_row(sample.frame, sample.scene),
     }
+
+
+def _delivery_row(
+    info: DatasetInfo, name: str, reading: capture.SensorReading | capture.PointCloud
+) -> dict[str, Any]:
+    found = label_parts.delivery(info, name, reading)
+    return {} if found is None else {"delivery": found}
 
 
 def _box_row(item: ObjectTruth) -> dict[str, Any]:
@@ -233,6 +243,12 @@ def _chunks(
     for name in info.lidars:
         if scans := _readings(rows, "lidars", name):
             yield from _lidar_chunks(info, name, scans)
+    for kind in ("cameras", "lidars"):
+        for name in sorted({name for row in rows for name in row[kind]}):
+            for path, found, columns in rerun_labels.delivery_entities(
+                name, _readings(rows, kind, name)
+            ):
+                yield _chunk(info, path, found, columns)
     for name in sorted({name for row in rows for name in row.get("faults", ())}):
         yield _fault_chunk(info, name, rows)
 

@@ -1,4 +1,4 @@
-"""Lanes, tracked points, voxels, layers and mirrors in recordings of the exporter ``rerun``.
+"""Lanes, tracks, voxels, layers, mirrors and deliveries in recordings of the exporter ``rerun``.
 
 They have the entities and colours of ``gen-data preview``. Rows are plain values, in the fragments
 of shards; columns hold one entity, for the rows that have it.
@@ -12,20 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.core import serialization
-from gen_data.core.capture import LAYERS, Channel
+from gen_data.core.capture import LAYERS, MIRRORED, Channel
 from gen_data.core.sample import EgoTruth, ImageTruth, Occupancy, SensorTracks
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import label_parts
 from gen_data.exporters.image_files import depth_units, read_image
-from gen_data.exporters.label_colors import color_ids
+from gen_data.exporters.label_colors import color_ids, color_positions
 from gen_data.exporters.png import RowFilter, encode_png
 
 Row = Mapping[str, Any]
 Entity = tuple[str, Sequence[Row], Any]
 """Path of an entity, the rows of samples that have values, and their columns."""
-COLORED = {*LAYERS, Channel.SEEN_IN_MIRROR} - {Channel.DEPTH_LAYERS}
-"""Channels of ids, which are coloured."""
+COLORED = {*LAYERS, *MIRRORED} - {Channel.DEPTH_LAYERS}
+"""Channels of ids and places, which are coloured."""
 LEVEL = 1
 """Of compression of images that are coloured or taken apart."""
 
@@ -166,14 +166,19 @@ def channel_entities(
 ) -> Iterator[Entity]:
     """Entities of a channel of layers, one of each layer, or of the instances in mirrors.
 
-    Depth is below the camera's image, as other depths; ids are coloured, in a view each.
+    Depth is below the camera's image, as other depths; ids and places are coloured, in a view each.
+    Places are points in the world, too.
     """
     import rerun as rr
 
-    images = [
+    decoded = (
         read_image(path, channel, depth_scale_m, tuple(row["size"]))
         for path, row in zip(paths, rows, strict=True)
-    ]
+    )
+    if channel is Channel.MIRRORED_POSITION:
+        yield from _mirrored_entities(camera, rows, decoded)
+        return
+    images = list(decoded)
     if channel is Channel.DEPTH_LAYERS:
         root = f"world/cameras/{camera}/image/{channel.value}"
         for suffix, layers in _layers(images):
@@ -188,12 +193,46 @@ def channel_entities(
         return
     root = f"channels/{camera}/{channel.value}"
     for suffix, layers in _layers(images) if channel in LAYERS else [("", images)]:
-        blobs = [encode_png(color_ids(ids), RowFilter.UP, LEVEL) for ids in layers]
-        columns = rr.EncodedImage.columns(
-            blob=[np.frombuffer(blob, np.uint8) for blob in blobs],
-            media_type=["image/png"] * len(blobs),
-        )
-        yield f"{root}{suffix}", rows, columns
+        yield f"{root}{suffix}", rows, _colored_columns(map(color_ids, layers))
+
+
+def _mirrored_entities(
+    camera: str, rows: Sequence[Row], images: Iterable[NDArray[Any]]
+) -> Iterator[Entity]:
+    """Coloured images of places in mirrors, and some of their points in the world."""
+    import rerun as rr
+
+    pictures, found = [], []
+    for position_m in images:
+        pictures.append(color_positions(position_m))
+        found.append(label_parts.mirrored_points(position_m))
+    yield f"channels/{camera}/mirrored_position", rows, _colored_columns(pictures)
+    places_m, colors = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    if len(places_m):
+        columns = rr.Points3D.columns(positions=places_m, colors=colors)
+        counts = [len(places) for places, _ in found]
+        yield f"world/mirrored/{camera}", rows, columns.partition(counts)
+
+
+def _colored_columns(pictures: Iterable[NDArray[np.uint8]]) -> Any:
+    import rerun as rr
+
+    blobs = [encode_png(picture, RowFilter.UP, LEVEL) for picture in pictures]
+    return rr.EncodedImage.columns(
+        blob=[np.frombuffer(blob, np.uint8) for blob in blobs],
+        media_type=["image/png"] * len(blobs),
+    )
+
+
+def delivery_entities(sensor: str, rows: Sequence[Row]) -> Iterator[Entity]:
+    """Numbers over time of a sensor with faults of delivery: ``arrivals`` and ``late_s``."""
+    import rerun as rr
+
+    known = [row for row in rows if "delivery" in row]
+    if known:
+        for k, name in enumerate(("arrivals", "late_s")):
+            numbers = [float(row["delivery"][k]) for row in known]
+            yield f"delivery/{sensor}/{name}", known, rr.Scalars.columns(scalars=numbers)
 
 
 def _layers(images: Sequence[NDArray[Any]]) -> Iterator[tuple[str, list[NDArray[Any]]]]:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from gen_data.core import boxes, capture, sample, skeletons
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.exporters.label_colors import Rgb, color_ids, id_color
-from gen_data.preview.palette import color_depth, color_flow, color_positions, grey_infrared
+from gen_data.exporters.label_colors import Rgb, color_ids, color_positions, id_color
+from gen_data.preview.palette import color_depth, color_flow, grey_infrared
 
 Image = NDArray[np.uint8]
 

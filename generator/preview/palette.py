@@ -15,17 +15,6 @@ def color_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
     return np.repeat(grey[..., None], 3, axis=2)
 
 
-def color_positions(position_m: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Convert positions [h, w, 3] to red, green and blue, uint8 [h, w, 3]; black = NaN."""
-    seen = np.isfinite(position_m).all(axis=-1)
-    colors = np.zeros(position_m.shape, np.uint8)
-    if seen.any():
-        low, high = np.quantile(position_m[seen], [0.01, 0.99], axis=0)
-        share = (position_m[seen] - low) / np.maximum(high - low, 1e-6)
-        colors[seen] = np.clip(40 + 215 * share, 40, 255).astype(np.uint8)
-    return colors
-
-
 def grey_infrared(infrared: NDArray[np.uint16]) -> NDArray[np.uint8]:
     """Convert an infrared image [h, w] to grey with gamma 2.2, uint8 [h, w, 3]; 1 % saturates."""
     white = max(float(np.quantile(infrared, 0.99)), 1.0)

@@ -141,12 +141,14 @@ class Recorder:
         for name, reading in sorted(sample.capture.readings.items()):
             self._set_time(sample, reading.time_s)
             self._record_image(name, reading, sample.truth[name])
+            self._record_delivery(name, reading)
             if tracks is not None:
                 points = tracked_points(tracks.sensors[name])
                 self.stream.log(f"world/cameras/{name}/image/tracks", points)
         for name, cloud in sorted(sample.capture.clouds.items()):
             self._set_time(sample, cloud.time_s)
             self._record_cloud(name, cloud)
+            self._record_delivery(name, cloud)
         self._record_faults(sample.capture)
 
     def _record_faults(self, capture: Capture) -> None:
@@ -242,12 +244,20 @@ class Recorder:
             else:
                 colored = rr.Image(overlay.channel_image(reading, channel)).compress(90)
                 self.stream.log(f"channels/{name}/{channel.value}", colored)
-        self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
+        if Channel.MIRRORED_POSITION in reading.channels:
+            mirrored = reading.channels[Channel.MIRRORED_POSITION]
+            places_m, colors = label_parts.mirrored_points(mirrored)
+            self.stream.log(f"world/mirrored/{name}", rr.Points3D(places_m, colors=colors))
+        self._record_truth(f"{path}/image", truth)
+
+    def _record_truth(self, path: str, truth: ImageTruth) -> None:
+        """Log the annotations of an image below it."""
+        self.stream.log(f"{path}/boxes", boxes_2d(truth))
         if truth.borders is not None:
-            self.stream.log(f"{path}/image/lanes", lane_strips_2d(truth.borders))
+            self.stream.log(f"{path}/lanes", lane_strips_2d(truth.borders))
         if truth.texts is not None:
-            self.stream.log(f"{path}/image/texts", text_strips(truth.texts))
-        self._record_keypoints(f"{path}/image/keypoints", truth)
+            self.stream.log(f"{path}/texts", text_strips(truth.texts))
+        self._record_keypoints(f"{path}/keypoints", truth)
 
     def _record_keypoints(self, path: str, truth: ImageTruth) -> None:
         # One entity per object: Rerun joins the points of one class within an entity.
@@ -265,6 +275,13 @@ class Recorder:
                     show_labels=False,
                 )
                 self.stream.log(f"{path}/{item.instance.instance_id}", points)
+
+    def _record_delivery(self, name: str, reading: SensorReading | PointCloud) -> None:
+        """Log how often an image or scan arrives, and how late."""
+        found = label_parts.delivery(self.info, name, reading)
+        if found is not None:
+            for entity, number in zip(("arrivals", "late_s"), found, strict=True):
+                self.stream.log(f"delivery/{name}/{entity}", rr.Scalars(number))
 
     def _record_cloud(self, name: str, cloud: PointCloud) -> None:
         path = f"world/lidars/{name}"

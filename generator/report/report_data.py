@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gen_data.core import capture, errors, interfaces, system_calls
 from gen_data.report import (
+    delivery_statistics,
     image_statistics,
     label_checks,
     occupancy_statistics,
@@ -88,7 +89,9 @@ def describe_dataset(
         checks.add(image)
     scans = report_tables.make_scan_tables(tuple(read_scans(folder)))
     voxels = occupancy_statistics.count_occupancy(stored).tables()
-    tables = (*_label_tables(stored), *report_tables.make_tables(objects.survey), *scans, *voxels)
+    made = report_tables.make_tables(objects.survey)
+    arrived = delivery_statistics.delivery_tables(stored)
+    tables = (*_label_tables(stored), *made, *scans, *voxels, *arrived)
     progress("images")
     files, looks = _measure(stored, objects.splits)
     progress("parameters")

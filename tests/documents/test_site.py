@@ -135,6 +135,16 @@ def test_every_configuration_has_a_picture_and_a_section_of_the_gallery() -> Non
         assert shown == (name in pictures.read_sheets())
 
 
+def test_every_ladder_is_in_the_gallery() -> None:
+    gallery = (ROOT / "docs/gallery.md").read_text("utf-8")
+    ladders = pictures.read_ladders()
+
+    assert ladders
+    for name, strip in ladders.items():
+        path = pictures.strip_path(pictures.LADDER, name, strip).relative_to(pictures.DOCS)
+        assert f"({path.as_posix()})" in gallery
+
+
 def test_pictures_are_drawn_and_small() -> None:
     """One file per entry and no other; each has as many columns as its strip."""
     jobs = list(pictures.find_jobs())

@@ -1,5 +1,6 @@
 """Lost, doubled and late readings in formats."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,15 +9,16 @@ import pytest
 
 from gen_data.core.capture import Capture
 from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.interfaces import DatasetInfo, Modality
 from gen_data.core.sample import Sample
 from gen_data.exporters import TABLE
-from gen_data.exporters.base import check_delivery
+from gen_data.exporters.base import _held_once, check_delivery
 from gen_data.pipeline.delivered import delivered
 from tests.exporters.drives import drive_info
 from tests.exporters.test_exporter_contract import files, given
 from tests.tiers import sampled
 
+ROOT = Path(__file__).parents[2]
 LOST = {1: {"imu", "right"}, 2: {"left", "color", "arm"}, 4: {"top"}, 5: {"right", "left"}}
 """Sensors whose reading is lost, by sample."""
 
@@ -105,6 +107,30 @@ def test_formats_refuse_deliveries_that_they_cannot_express(name: str, world: An
         assert not expected or f"exporter '{name}': sensor '" in message
         assert not expected or "set it to 0" in message
     assert "faults." not in refused(name, info)
+
+
+def test_the_page_of_faults_states_what_each_format_does_with_lost_and_doubled_readings() -> None:
+    """Every format is in one row of the table, which says of whose readings copies are refused."""
+    page = (ROOT / "docs/faults.md").read_text("utf-8")
+    rows = [line.strip("|").split("|") for line in page.splitlines() if line.startswith("| `")]
+    stated = {
+        name: (lost.strip().split(":")[0], doubled.strip())
+        for first, lost, doubled, _ in (row for row in rows if len(row) == 4)
+        for name in re.findall(r"`(\w+)`", first)
+    }
+    expected = {}
+    for name in TABLE.names():
+        kinds = _held_once(TABLE.load(name)())
+        images, scans = Modality.CAMERA in kinds, Modality.LIDAR in kinds
+        copies = {(True, True): "refused, images and scans", (True, False): "images refused",
+                  (False, True): "scans refused", (False, False): "-"}[images, scans]  # fmt: skip
+        expected[name] = ("missing", copies)
+    expected |= dict.fromkeys(MARKED, ("refused", "refused"))
+    expected |= dict.fromkeys(("rerun", "usd"), ("shown", "shown once"))
+    nothing = ("have no images and scans", "-")
+    expected |= dict.fromkeys(("map_vectors", "opendrive", "tables"), nothing)
+    expected["mcap"] = ("missing", "two equal messages")
+    assert stated == expected
 
 
 def test_mcap_has_arrivals_as_log_times_and_doubled_readings_twice(

@@ -18,12 +18,13 @@ from gen_data.exporters.label_parts import BORDER_COLORS, LIFT_M
 from gen_data.exporters.rerun import Rerun
 from gen_data.preview.rerun_recording import Recorder
 from tests.exporters.drives import drive_info
+from tests.exporters.test_delivery import with_record
 from tests.exporters.test_rerun import Table, tables
 
 VISIBLE, OCCLUDED, OUTSIDE = 0, 2, 3
 MEDIA = (
     Channel.RGB, Channel.DEPTH_LAYERS, Channel.INSTANCE_LAYERS, Channel.MATERIAL_LAYERS,
-    Channel.SEEN_IN_MIRROR,
+    Channel.SEEN_IN_MIRROR, Channel.MIRRORED_POSITION,
 )  # fmt: skip
 LINE = ((-90.0, 0.0, 0.5), (0.0, 2.0, 0.5), (90.0, 0.0, 0.5))
 IN_IMAGE = BorderTruth(
@@ -53,6 +54,14 @@ def make_tracks(sample: Sample) -> PointTracks:
     return PointTracks(np.zeros(3, np.uint16), position, {"left": seen, "right": seen})
 
 
+def make_mirror(shape: tuple[int, ...], number: int) -> Any:
+    """A mirror in the right half of the image: X grows with the column, Y with the row [m]."""
+    v, u = np.indices(shape)
+    places = np.stack([0.25 * u, 0.5 * v, np.full(shape, number)], axis=-1).astype(np.float32)
+    places[u < shape[1] // 2] = np.nan
+    return places
+
+
 def labelled(sample: Sample) -> Sample:
     """A sample of the drive with all further labels; the left camera has two layers."""
     left = sample.capture.readings["left"]
@@ -64,6 +73,7 @@ def labelled(sample: Sample) -> Sample:
         Channel.INSTANCE_LAYERS: np.stack([np.zeros_like(ids), ids], axis=-1),
         Channel.MATERIAL_LAYERS: np.stack([np.full_like(ids, 2), np.zeros_like(ids)], axis=-1),
         Channel.SEEN_IN_MIRROR: ids[::-1].copy(),
+        Channel.MIRRORED_POSITION: make_mirror(ids.shape, sample.index),
     }
     frame = EgoTruth(
         "ego",
@@ -194,6 +204,60 @@ def test_each_layer_is_an_image_of_its_own(read: dict[str, Table], drive: list[S
             assert (shown[..., ::-1] == palette[wanted]).all(), path
 
 
+def test_points_in_mirrors_are_in_the_world_in_the_colours_of_their_image(
+    read: dict[str, Table], drive: list[Sample]
+) -> None:
+    """Of every fourth pixel and row, from the third; red grows with X, green with Y."""
+    table = read["/world/mirrored/left"]
+    for sample in training(drive):
+        k, height, width = (
+            sample.index,
+            *sample.capture.readings["left"].channels[Channel.RGB].shape[:2],
+        )
+        expected = [
+            (0.25 * u, 0.5 * v, float(k))
+            for v in range(2, height, 4)
+            for u in range(2, width, 4)
+            if u >= width // 2
+        ]
+        places = np.array(table["Points3D:positions"][k])
+        assert np.abs(places - expected).max() < 0.05
+        image = decoded(read["/channels/left/mirrored_position"], "EncodedImage", k)[..., ::-1]
+        u, v = (places[:, :2] / (0.25, 0.5)).round().astype(int).T
+        assert rgb(table["Points3D:colors"][k]) == [tuple(c) for c in image[v, u].tolist()]
+        assert not image[:, : width // 2].any()
+        assert (np.diff(image[..., width // 2 :, 0].astype(int), axis=1) >= 0).all()
+        assert (np.diff(image[:, width // 2 :, 1].astype(int), axis=0) >= 0).all()
+
+
+def test_deliveries_are_numbers_over_time_of_sensors_that_have_such_faults(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """One image is lost, one arrives twice and late; a scan is late, the other camera is sound."""
+    records = {1: {"lost": True}, 2: {"doubled": True, "arrived_s": samples[2].scene.time_s + 0.25}}
+    drive = [with_record(s, {"left"}, records.get(s.index, {})) for s in samples]
+    late = {"arrived_s": drive[3].capture.clouds["top"].time_s + 0.125}
+    drive[3] = with_record(drive[3], {"top"}, late)
+    info = drive_info(world)
+    faulty = {"left": ("lost", "doubled")}
+    sensors = tuple(replace(s, faults=faulty.get(s.name, ())) for s in info.sensors)
+    info = replace(info, sensors=sensors)
+    folder = world.export(Rerun(), info, drive, tmp_path)
+    read: dict[str, Table] = {}
+    for path in sorted(folder.rglob("*.rrd")):
+        for entity, columns in tables(path).items():
+            for name, values in columns.items():
+                read.setdefault(entity, {}).setdefault(name, {}).update(values)
+    arrivals = read["/delivery/left/arrivals"]["Scalars:scalars"]
+    assert {k: v for k, (v,) in arrivals.items()} == {
+        s.index: {1: 0.0, 2: 2.0}.get(s.index, 1.0) for s in samples
+    }
+    late_s = read["/delivery/left/late_s"]["Scalars:scalars"]
+    assert {k: v for k, (v,) in late_s.items() if v} == {2: pytest.approx(0.25)}
+    assert read["/delivery/top/late_s"]["Scalars:scalars"] == {3: [pytest.approx(0.125)]}
+    assert not any(path.startswith("/delivery/right") for path in read)
+
+
 class _Stream:
     def __init__(self) -> None:
         self.logged: dict[str, Any] = {}
@@ -227,6 +291,9 @@ def test_recordings_of_exports_and_previews_show_the_same(
             assert read[f"/{path}"][name][sample.index] == values, (path, name)
             compared += 1
     assert compared > 12
+    places = stream.logged["world/mirrored/left"].positions.as_arrow_array().to_pylist()
+    stored = read["/world/mirrored/left"]["Points3D:positions"][sample.index]
+    assert np.abs(np.subtract(places, stored)).max() < 0.005  # half a unit of the file
 
 
 def test_a_data_set_without_these_labels_has_none_of_their_entities(
