@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 from benchmarks.peers.worker import Round, output_folder
-from benchmarks.peers.workload import VIEWS_NAME, Views, make_config
+from benchmarks.peers.workload import VIEWS_NAME, Views, read_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.sample import Sample
 from gen_data.pipeline import Pipeline
@@ -15,7 +15,7 @@ from gen_data.runner.shard import drop_pixels, write_images, write_records
 def open_renderer(folder: Path) -> Round:
     """Render the settled views: the work of the other renderers, and the boxes as JSON lines."""
     views: Views = pickle.loads((folder / VIEWS_NAME).read_bytes())
-    factory = PipelineFactory(make_config(folder / "assets", folder, full=False), len(views))
+    factory = PipelineFactory(read_config(folder, full=False), len(views))
     pipeline, out = factory(), output_folder(folder, "ours")
 
     def write_all() -> None:
@@ -27,7 +27,7 @@ def open_renderer(folder: Path) -> Round:
 def open_pipeline(folder: Path) -> Round:
     """Draw, settle, render and annotate new scenes; write images, every label and COCO."""
     views: Views = pickle.loads((folder / VIEWS_NAME).read_bytes())
-    factory = PipelineFactory(make_config(folder / "assets", folder, full=True), len(views))
+    factory = PipelineFactory(read_config(folder, full=True), len(views))
     pipeline, out = factory().__enter__(), output_folder(folder, "ours, full samples")
 
     def write_all() -> None:

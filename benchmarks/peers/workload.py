@@ -1,6 +1,9 @@
-"""Scenes of the comparison with other renderers: ten objects of 12,000 triangles on a ground.
+"""Scenes of the comparison with other renderers: ten objects on a ground.
 
-Everything is made here, from formulas, so that the workload is the same wherever it runs.
+In the workload ``fine`` each has 12,012 triangles, and every view has its own scene. In ``small``
+five have 480 triangles and five are primitives, and five views share a scene, as where a renderer
+of a physics engine is at home. Everything is made here, from formulas, so that the workload is the
+same wherever it runs.
 """
 
 import pickle
@@ -17,12 +20,15 @@ from gen_data.core.scene import Scene
 from gen_data.pipeline.pipeline import DrawnView
 
 OBJECTS = 10
-RINGS, SECTORS = 78, 78
-"""Of every object's surface: 2 * 78 * 77 = 12,012 triangles."""
+FINE_RINGS, SMALL_RINGS = 78, 16
+"""Of an object's surface, and as many sectors: 2 * 78 * 77 = 12,012, and 2 * 16 * 15 = 480
+triangles."""
+VIEWS_PER_SCENE = {"fine": 1, "small": 5}
+"""Names of the workloads."""
 GROUND_SIDE_M = 2.4
 
 CONFIG = """\
-views_per_scene: 1
+views_per_scene: {views_per_scene}
 assets: {{folders: [{folder}]}}
 elements:
   - {{type: surface, name: ground, asset: user/ground/ground}}
@@ -52,16 +58,18 @@ exporters: [{exporters}]
 FULL_LABELS = ("boxes2d", "boxes3d", "instance_masks", "amodal_masks", "poses", "visibility")
 
 
-def object_mesh(number: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """One of the objects: a superquadric with bumps, 18 to 38 cm long.
+Mesh = tuple[NDArray[np.float64], NDArray[np.int64]]
+"""Vertices [m], float [n, 3], and triangles, int [m, 3], counter-clockwise outward."""
 
-    Returns:
-        Vertices [m], float [n, 3], and triangles, int [12012, 3], counter-clockwise outward.
+
+def object_mesh(number: int, rings: int = FINE_RINGS) -> Mesh:
+    """One of the objects: a superquadric with bumps, 18 to 38 cm long.
 
     Source of the formula: Barr, "Superquadrics and Angle-Preserving Transformations", 1981.
     """
-    latitude = np.linspace(-np.pi / 2, np.pi / 2, RINGS + 1)[1:-1, None]
-    longitude = np.linspace(-np.pi, np.pi, SECTORS, endpoint=False)[None, :]
+    sectors = rings
+    latitude = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)[1:-1, None]
+    longitude = np.linspace(-np.pi, np.pi, sectors, endpoint=False)[None, :]
     squareness = 0.4 + 0.15 * (number % 5)
     radius_m = np.array([0.13, 0.11, 0.15]) * (0.8 + 0.05 * number)
     bumps = 1 + 0.04 * np.sin((3 + number) * longitude) * np.cos(latitude) * np.cos(4 * latitude)
@@ -79,7 +87,7 @@ def object_mesh(number: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     )
     poles = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
     vertices_m = np.concatenate([rows.reshape(-1, 3), poles]) * radius_m
-    index = np.arange((RINGS - 1) * SECTORS).reshape(RINGS - 1, SECTORS)
+    index = np.arange((rings - 1) * sectors).reshape(rings - 1, sectors)
     right = np.roll(index, -1, axis=1)
     south, north = len(vertices_m) - 2, len(vertices_m) - 1
     a, b, c, d = index[:-1], right[:-1], right[1:], index[1:]
@@ -92,20 +100,56 @@ def object_mesh(number: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return vertices_m, np.concatenate([part.reshape(-1, 3) for part in faces])
 
 
-def ground_mesh() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """A slab, 2 cm high: vertices [m] and triangles."""
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-    vertices_m = corners * [GROUND_SIDE_M / 2, GROUND_SIDE_M / 2, 0.01]
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    first = 4 * np.arange(6)[:, None]  # every side has vertices of its own: renderers smooth others
-    faces = np.concatenate([first + np.array(corner) for corner in ((0, 1, 2), (0, 2, 3))])
-    return vertices_m[np.ravel(quads)], faces
+def ground_mesh() -> Mesh:
+    """A slab, 2 cm high."""
+    return prism_mesh(4, (GROUND_SIDE_M, GROUND_SIDE_M, 0.02))
 
 
-def write_assets(folder: Path) -> None:
+def prism_mesh(sides: int, size_m: tuple[float, float, float], taper: float = 1.0) -> Mesh:
+    """A prism about Z, a frustum if ``taper`` is not 1; of 4 sides, a box.
+
+    Args:
+        sides: Corners of the base, the first between +X and +Y; even.
+        size_m: Lengths of the box around the base, and the height.
+        taper: Size of the top by that of the base.
+    """
+    angle = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    ring *= np.array(size_m[:2]) / np.ptp(ring, axis=0)
+    low, high = (
+        np.column_stack([share * ring, np.full(sides, z)])
+        for share, z in ((1.0, -0.5 * size_m[2]), (taper, 0.5 * size_m[2]))
+    )
+    # Every side has vertices of its own: renderers smooth others.
+    walls = np.stack([low, np.roll(low, -1, 0), np.roll(high, -1, 0), high], axis=1)
+    corner = 4 * np.arange(sides)[:, None]
+    fan = np.arange(1, sides - 1)[:, None]
+    faces = [
+        *(corner + np.array(three) for three in ((0, 1, 2), (0, 2, 3))),
+        4 * sides + fan[:, [0, 0, 0]] * [0, 1, 1] + [0, 1, 0],
+        5 * sides + fan[:, [0, 0, 0]] * [0, 1, 1] + [0, 0, 1],
+    ]
+    return np.concatenate([walls.reshape(-1, 3), low, high]), np.concatenate(faces)
+
+
+def object_meshes(workload: str) -> list[Mesh]:
+    """The objects of a workload."""
+    if workload == "fine":
+        return [object_mesh(k) for k in range(OBJECTS)]
+    return [
+        *(object_mesh(k, SMALL_RINGS) for k in range(0, OBJECTS, 2)),
+        prism_mesh(4, (0.2, 0.14, 0.1)),
+        prism_mesh(4, (0.12, 0.12, 0.24)),
+        prism_mesh(24, (0.14, 0.14, 0.2)),
+        prism_mesh(24, (0.18, 0.18, 0.16), taper=0.3),
+        prism_mesh(6, (0.2, 0.2, 0.12)),
+    ]
+
+
+def write_assets(folder: Path, workload: str) -> None:
     """Write the ground and the objects as OBJ files, each in the folder of its category."""
-    meshes = {"ground": ground_mesh()} | {f"thing{k}": object_mesh(k) for k in range(OBJECTS)}
-    for name, (vertices_m, faces) in meshes.items():
+    things = {f"thing{k}": mesh for k, mesh in enumerate(object_meshes(workload))}
+    for name, (vertices_m, faces) in {"ground": ground_mesh(), **things}.items():
         lines = [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in vertices_m]
         lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
         path = folder / name / f"{name}.obj"
@@ -113,41 +157,52 @@ def write_assets(folder: Path) -> None:
         path.write_text("\n".join(lines) + "\n")
 
 
-def make_config(assets: Path, folder: Path, *, full: bool) -> Config:
-    """The workload's configuration, with every label and COCO if ``full``."""
+def write_config(folder: Path, workload: str, *, full: bool) -> None:
+    """Write the workload's configuration, with every label and COCO if ``full``."""
     names = [f"thing{k}" for k in range(OBJECTS)]
     elements = [
         f"  - {{type: objects, name: {n}, on: ground, count: 1, assets: {{ids: [user/{n}/{n}]}}}}"
         for n in names
     ]
     text = CONFIG.format(
-        folder=assets,
+        folder=folder / ASSETS_NAME,
+        views_per_scene=VIEWS_PER_SCENE[workload],
         elements="\n".join(elements),
         randomizers="\n".join(f"  - {{type: objects, name: {n}, count: 1}}" for n in names),
         annotations=", ".join(FULL_LABELS if full else ()),
         exporters="{type: coco}" if full else "",
     )
-    path = folder / f"workload_{'full' if full else 'plain'}.yaml"
-    path.write_text(text)
-    return load_config(str(path), seed=1)
+    _config_path(folder, full=full).write_text(text)
 
 
-VIEWS_NAME = "views.pickle"
-"""File of the settled views, with the sensors that read them."""
+def read_config(folder: Path, *, full: bool) -> Config:
+    """The configuration that ``prepare`` has written."""
+    return load_config(str(_config_path(folder, full=full)), seed=1)
+
+
+def _config_path(folder: Path, *, full: bool) -> Path:
+    return folder / f"workload_{'full' if full else 'plain'}.yaml"
+
+
+ASSETS_NAME, VIEWS_NAME = "assets", "views.pickle"
+"""Folder of the meshes, and file of the settled views, with the sensors that read them."""
 Views = list[tuple[DrawnView, tuple[Sensor, ...]]]
 
 
-def prepare(folder: Path, count: int) -> None:
-    """Draw and settle ``count`` scenes; write them for this renderer, and as worlds for others."""
-    assets = folder / "assets"
-    write_assets(assets)
+def prepare(folder: Path, count: int, workload: str) -> None:
+    """Draw and settle ``count`` views; write them for this renderer, and as worlds for others."""
+    write_assets(folder / ASSETS_NAME, workload)
+    for full in (False, True):
+        write_config(folder, workload, full=full)
     views: Views = []
-    with PipelineFactory(make_config(assets, folder, full=False), count)() as pipeline:
+    with PipelineFactory(read_config(folder, full=False), count)() as pipeline:
         for k in range(count):
-            accepted = pipeline.accepted_scene(k)
-            views.append((pipeline.drawn_view(accepted, 0), tuple(accepted.sensors)))
+            scene, view = divmod(k, VIEWS_PER_SCENE[workload])
+            accepted = pipeline.accepted_scene(scene)
+            views.append((pipeline.drawn_view(accepted, view), tuple(accepted.sensors)))
     (folder / VIEWS_NAME).write_bytes(pickle.dumps(views))
-    write_worlds([describe_world(view.scene, assets) for view, _ in views], folder)
+    worlds = [describe_world(view.scene, folder / ASSETS_NAME) for view, _ in views]
+    write_worlds(worlds, folder)
 
 
 def describe_world(scene: Scene, assets: Path) -> World:

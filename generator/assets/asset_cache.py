@@ -163,13 +163,26 @@ class Store:
 
 def encode_arrays(key: str, arrays: Arrays) -> bytes:
     """Encode arrays in the format of a cache file."""
+    return b"".join(_encode_parts(key, arrays))
+
+
+def _encode_parts(key: str, arrays: Arrays) -> list[bytes | memoryview]:
+    """The parts of a cache file; arrays are not copied."""
     listed = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
     head = json.dumps({"key": key, "arrays": listed}).encode()
     head += b" " * _padding(_PREFIX.size + len(head))
-    body = bytearray(struct.pack("<I", len(head)) + head)
+    parts: list[bytes | memoryview] = [struct.pack("<I", len(head)) + head]
     for array in arrays.values():
-        body += array.tobytes() + bytes(_padding(array.nbytes))
-    return struct.pack("<I", crc32(body)) + body
+        parts += [_bytes_of(array), bytes(_padding(array.nbytes))]
+    checksum = 0
+    for part in parts:
+        checksum = crc32(part, checksum)
+    return [struct.pack("<I", checksum), *parts]
+
+
+def _bytes_of(array: NDArray[Any]) -> memoryview:
+    """Bytes of an array in C order."""
+    return np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
 
 
 def decode_arrays(data: bytes, key: str) -> Arrays | None:
@@ -260,8 +273,8 @@ def _is_intact(file: BinaryIO) -> bool:
 
 
 def _store(path: str, key: str, arrays: Arrays) -> None:
-    data = encode_arrays(key, arrays)
-    _write_atomically(Path(path), lambda file: file.write(data))
+    parts = _encode_parts(key, arrays)
+    _write_atomically(Path(path), lambda file: file.writelines(parts))
 
 
 def _padding(size: int) -> int:

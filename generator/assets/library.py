@@ -12,6 +12,7 @@ from gen_data.assets import (
     families,
     family_parameters,
     file_library,
+    known_bounds,
     paths,
     procedural_library,
 )
@@ -307,27 +308,43 @@ class Library:
         owner = asset_id.partition("#")[0]
         if self._is_generated(owner) and not self._generated.is_stored(parse_asset_id(owner)):
             return compute()
-        content = {"asset": self.get(owner).sha256, "id": asset_id, "derived": name}
-        return self._disk.arrays(content_key(content), compute)
+        return self._disk.arrays(self._derived_key(asset_id, name), compute)
+
+    def _derived_key(self, asset_id: str, name: str) -> str:
+        owner = asset_id.partition("#")[0]
+        return content_key({"asset": self.get(owner).sha256, "id": asset_id, "derived": name})
 
     def _bounds(self, asset_id: str) -> tuple[Bounds, ...]:
         """Bounds of the mesh and, if there are any, those of the body.
 
-        Stored beside the mesh: of the things that a scene tries to place, half find no place, and
-        their meshes need not be read.
+        Known or stored beside the mesh: of the things that a scene tries to place, half find no
+        place, and their meshes need not be made or read.
         """
 
-        def compute() -> Arrays:
-            summary = self._summarize(asset_id)
-            body = () if summary.body_bounds_m is None else (summary.body_bounds_m,)
-            return {"corners_m": np.array((summary.bounds_m, *body), np.float64)}
-
         def read() -> tuple[Bounds, ...]:
-            known = asset_id in self._summaries
-            arrays = compute() if known else self.derived(asset_id, _BOUNDS, compute)
-            return tuple((_vec3(low), _vec3(high)) for low, high in arrays["corners_m"].tolist())
+            corners_m = None
+            if asset_id in self._summaries:
+                corners_m = self.measured_bounds_m(asset_id)
+            elif self._is_generated(asset_id):
+                corners_m = known_bounds.read_table().find(self.bounds_key(asset_id))
+            if corners_m is None:
+                stored = self.derived(
+                    asset_id, _BOUNDS, lambda: {"corners_m": self.measured_bounds_m(asset_id)}
+                )
+                corners_m = stored["corners_m"]
+            return tuple((_vec3(low), _vec3(high)) for low, high in corners_m.tolist())
 
         return self._boxes.get(asset_id, read)
+
+    def measured_bounds_m(self, asset_id: str) -> known_bounds.Corners:
+        """Bounds of the mesh, which is made or read, and of the body, if it has one."""
+        summary = self._summarize(asset_id)
+        body = () if summary.body_bounds_m is None else (summary.body_bounds_m,)
+        return np.array((summary.bounds_m, *body), np.float64)
+
+    def bounds_key(self, asset_id: str) -> str:
+        """Content key of an asset's stored bounds."""
+        return self._derived_key(asset_id, _BOUNDS)
 
     def _summarize(self, asset_id: str) -> _MeshSummary:
         """Bounds, materials and keypoints. Raises AssetError if there is no mesh."""

@@ -17,7 +17,6 @@ import numpy as np
 
 from gen_data.assets import asset_folder, robot_description
 from gen_data.core.asset_types import Joint
-from gen_data.core.distribution import install_command
 from gen_data.core.errors import AssetError
 from gen_data.core.safe_xml import parse_xml
 from gen_data.core.se3 import SE3, Vec3, rotation_to_quaternion
@@ -39,18 +38,16 @@ def read_mjcf(folder: asset_folder.Folder, relative: str) -> robot_description.R
     ``conaffinity`` do.
 
     Raises:
-        AssetError: if MuJoCo refuses it or is not installed, or it refers outside the folder.
+        AssetError: if MuJoCo refuses it, or it refers outside the folder.
     """
+    import mujoco
+
     place = str(folder.root / relative)
     data = folder.read(relative)
     root = parse_xml(data, place, "mujoco", "an MJCF", _MAX_ELEMENTS)
     included = _expand(folder, relative, root)
     # Unchanged where nothing is included: MuJoCo's messages state lines.
     text = tostring(root, encoding="unicode") if included else data.decode("utf-8", "replace")
-    try:
-        import mujoco
-    except ImportError:
-        raise AssetError(f"{place}: MJCF needs MuJoCo; run: {install_command('mjcf')}") from None
     try:
         spec = mujoco.MjSpec.from_string(text)
         source = _Source(folder, relative, *_strip_files(spec, mujoco))

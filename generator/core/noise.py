@@ -116,15 +116,23 @@ def worley(cells: Cells, rng: Rng, jitter: float = 1.0, size_px: int = SIZE_PX) 
     nearest = np.full((size_px, size_px), 9.0, dtype=np.float32)
     second = nearest.copy()
     number = np.zeros((size_px, size_px), dtype=np.int64)
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            row, column = (iy + dy) % down, (ix + dx) % across
-            at = np.ix_(row, column)
-            away = (py[at] + (dy - fy)[:, None]) ** 2 + (px[at] + (dx - fx)[None, :]) ** 2
-            closer = away < nearest
-            second = np.where(closer, nearest, np.minimum(second, away))
-            number = np.where(closer, row[:, None] * across + column[None, :], number)
-            nearest = np.where(closer, away, nearest)
+    # Columns first, and in strips, as above.
+    columns = [(ix + dx) % across for dx in (-1, 0, 1)]
+    sides = [
+        (py.take(column, axis=1), px.take(column, axis=1) + (dx - fx), column)
+        for dx, column in zip((-1, 0, 1), columns, strict=True)
+    ]
+    for strip in (slice(k, k + _STRIP_PX) for k in range(0, size_px, _STRIP_PX)):
+        closest, next_one = nearest[strip], second[strip]
+        for dy in (-1, 0, 1):
+            row, away_y = (iy[strip] + dy) % down, (dy - fy[strip])[:, None]
+            for y, away_x, column in sides:
+                away = np.square(y.take(row, axis=0) + away_y)
+                away += np.square(away_x.take(row, axis=0))
+                point = row[:, None] * across + column[None, :]
+                np.copyto(number[strip], point, where=away < closest)
+                np.minimum(next_one, np.maximum(closest, away), out=next_one)
+                np.minimum(closest, away, out=closest)
     return Worley(np.sqrt(nearest), np.sqrt(second), number, down * across)
 
 

@@ -16,6 +16,7 @@ EXTRAS = {
     "nicegui": ("nicegui", "edit"),
     "pxr": ("usd-core", "usd"),
     "pyarrow": ("pyarrow", "formats"),
+    "pybullet": ("pybullet", "bullet"),
     "rerun": ("rerun-sdk", "preview"),
     "shapely": ("shapely", "formats"),
 }

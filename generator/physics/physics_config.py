@@ -6,6 +6,7 @@ from typing import Literal, get_args
 from pydantic import Field
 
 from gen_data.config.base_model import Strict
+from gen_data.core.distribution import install_command
 
 EngineName = Literal["pybullet", "mujoco"]
 
@@ -20,7 +21,10 @@ def missing_engine(engine: EngineName) -> str:
     if is_installed(engine):
         return ""
     others = " or ".join(f"'{name}'" for name in get_args(EngineName) if is_installed(name))
-    return f"'{engine}' is not installed; expected {others or 'an engine'}, or pip install {engine}"
+    remedy = f"pip install {engine}"
+    if engine == "pybullet":
+        remedy = f"{install_command('bullet')} (Python 3.10 or 3.11 on Linux x86-64)"
+    return f"'{engine}' is not installed; expected {others or 'an engine'}, or {remedy}"
 
 
 def default_engine() -> EngineName:

@@ -49,10 +49,10 @@ def test_the_default_engine_is_pybullet_where_it_is_installed(
 def test_an_engine_that_is_not_installed_is_refused_with_both_remedies(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The other engine, or its package."""
+    """The other engine, or the extra that brings its package."""
     monkeypatch.setattr("gen_data.physics.physics_config.is_installed", {"mujoco"}.__contains__)
     with (
-        pytest.raises(ConfigError, match=r"physics\.engine: 'pybullet'.*'mujoco'.*pip install py"),
+        pytest.raises(ConfigError, match=r"physics\.engine: 'pybullet'.*'mujoco'.*\[bullet\]"),
         open_engine(Solids(), PhysicsConfig(engine="pybullet")),
     ):
         pass

@@ -11,6 +11,7 @@ differ in brightness and colour.
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.assets.family import check_option
 from gen_data.config.data_files import load_table
@@ -67,25 +68,38 @@ class View:
 
     def paint(self, cover: Float32, paint: Float32 | float, share: float = 1.0) -> None:
         """Mix a colour, or an image of colours, where ``cover`` is 1."""
-        weight = (np.clip(cover, 0.0, 1.0) * share)[..., None]
-        self.pixels[:] = self.pixels * (1.0 - weight) + weight * paint
+        covered = cover > 0.0
+        rows, columns = (_extent(np.any(covered, axis=axis)) for axis in (1, 0))
+        weight = (np.clip(cover[rows, columns], 0.0, 1.0) * share)[..., None]
+        window = self.pixels[rows, columns]
+        if isinstance(paint, np.ndarray) and paint.ndim == 3:
+            paint = np.broadcast_to(paint, self.pixels.shape)[rows, columns]
+        window[:] = window * (1.0 - weight) + weight * paint
 
     def box(self, x0: float, y0: float, x1: float, y1: float) -> Float32:
         """Cover of a rectangle."""
-        inside = (self.x >= x0) & (self.x < x1) & (self.y >= y0) & (self.y < y1)
+        inside = ((self.x >= x0) & (self.x < x1)) & ((self.y >= y0) & (self.y < y1))
         cover: Float32 = inside.astype(np.float32)
         return cover
 
     def disc(self, x: float, y: float, rx: float, ry: float) -> Float32:
         """Cover of an ellipse with a soft rim."""
-        away = ((self.x - x) / rx) ** 2 + ((self.y - y) / ry) ** 2
-        cover: Float32 = np.clip((1.0 - away) * 3.0, 0.0, 1.0).astype(np.float32)
+        cover: Float32 = np.zeros(self.pixels.shape[:2], np.float32)
+        rows, columns = _extent(np.abs(self.y - y) < ry), _extent(np.abs(self.x - x) < rx)
+        away = ((self.x[:, columns] - x) / rx) ** 2 + ((self.y[rows] - y) / ry) ** 2
+        cover[rows, columns] = np.clip((1.0 - away) * 3.0, 0.0, 1.0)
         return cover
 
     def glow(self, x: float, y: float, radius: float, level: float, tint: Float32) -> None:
         """Add light around a lamp."""
         away = ((self.x - x) ** 2 + (self.y - y) ** 2) / radius**2
         self.pixels += (level * np.exp(-away))[..., None] * tint
+
+
+def _extent(covered: NDArray[np.bool_]) -> slice:
+    """From the first to the last true value; empty if there is none."""
+    places = np.flatnonzero(covered)
+    return slice(places[0], places[-1] + 1) if len(places) else slice(0, 0)
 
 
 def _room(view: View, rng: VariantRng, level: float) -> None:
