@@ -101,11 +101,14 @@ class _Ground:
 
     def height(self, points_m: Array) -> Array:
         """Heights [n] of the ground below points [n, 3] of the body."""
-        return self.relief.height(self.world(points_m))
+        return self.relief.height(self.plan(points_m))
 
-    def world(self, points_m: Array) -> Array:
-        """Points [n, 3] of the body in the world."""
-        return self.T_world_body.apply(np.asarray(points_m, np.float64) * self.scale)
+    def plan(self, points_m: Array) -> Array:
+        """Places [n, 2] in the world below points [n, 3] of the body."""
+        x, y = (np.asarray(points_m[:, k], np.float64) * self.scale for k in (0, 1))
+        x, y = _turned_about_z(self.T_world_body, x, y)
+        to_x, to_y, _ = self.T_world_body.translation_m
+        return np.stack([x + to_x, y + to_y], axis=1)
 
     def raised(self, points_m: Array) -> Array:
         """Points [n, 3] of the body, raised by the height of the ground below them."""
@@ -115,13 +118,18 @@ class _Ground:
 
     def turned(self, points_m: Array, normals: Array) -> Array:
         """Normals [n, 3] of the surface after it was raised."""
-        gradient = self.relief.gradient(self.world(points_m))
-        slopes = np.column_stack([gradient, np.zeros(len(gradient))])
-        along = self.T_world_body.inverse().rotate(slopes)
-        made = normals - along * normals[:, 2:]
-        length = np.sqrt((made * made).sum(axis=1, keepdims=True))
-        turned: Array = made / np.maximum(length, 1e-12)
-        return turned
+        slope_x, slope_y = self.relief.gradient(self.plan(points_m)).T
+        along_x, along_y = _turned_about_z(self.T_world_body.inverse(), slope_x, slope_y)
+        x, y, z = normals.T
+        x, y = x - along_x * z, y - along_y * z
+        length = np.maximum(np.sqrt(x * x + y * y + z * z), 1e-12)
+        return np.stack([x / length, y / length, z / length], axis=1)
+
+
+def _turned_about_z(pose: SE3, x: Array, y: Array) -> tuple[Array, Array]:
+    """Coordinates [n] of level vectors after the rotation of an upright pose."""
+    (a, b, _), (c, d, _), _ = pose.rotation()
+    return a * x + b * y, c * x + d * y
 
 
 def _raised_parts(parts_m: Sequence[Array], ground: _Ground) -> tuple[Array, ...]:
@@ -160,18 +168,20 @@ def _draped_mesh(mesh: MeshData, ground: _Ground, divide: _Cut) -> MeshData:
 def _refined(corners: Array, faces: Ints, slots: Ints, ground: _Ground) -> tuple[Array, Ints, Ints]:
     """Halve edges whose middles are too far from the ground; neighbours agree on every edge."""
     done_faces, done_slots = [], []
+    height = ground.height(corners[:, :3])
     for _ in range(_ROUNDS):
-        height = ground.height(corners[:, :3])
         one, other = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
         key = np.minimum(one, other) * len(corners) + np.maximum(one, other)
         key, which = np.unique(key, return_inverse=True)
-        edges = np.stack(np.divmod(key, len(corners)), axis=1)
-        middles = 0.5 * (corners[edges[:, 0]] + corners[edges[:, 1]])
-        off = ground.height(middles[:, :3]) - height[edges].mean(axis=1)
-        halved = np.abs(off) > LAND_M
-        number = np.full(len(edges), -1)
-        number[halved] = len(corners) + np.arange(int(halved.sum()))
-        corners = np.concatenate([corners, middles[halved]])
+        one, other = np.divmod(key, len(corners))
+        between = ground.height(0.5 * (corners[one, :3] + corners[other, :3]))
+        off = between - 0.5 * (height[one] + height[other])
+        halved = np.flatnonzero(np.abs(off) > LAND_M)
+        number = np.full(len(key), -1)
+        number[halved] = len(corners) + np.arange(len(halved))
+        middles = 0.5 * (corners[one[halved]] + corners[other[halved]])
+        corners = np.concatenate([corners, middles])
+        height = np.concatenate([height, between[halved]])
         inner = number[which.reshape(-1, 3)]
         # Nothing will divide a triangle whose edges are all near enough.
         active = (inner >= 0).any(axis=1)
@@ -208,8 +218,8 @@ def _cut_on_grid(
 ) -> tuple[Array, Ints, Ints]:
     """Cut along the lines of the grid and the diagonals of its cells."""
     for along_x, along_y in ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0)):
-        plan = ground.world(corners[:, :3]) / CELL_M
-        at = along_x * plan[:, 0] + along_y * plan[:, 1]
+        x, y = (ground.plan(corners) / CELL_M).T
+        at = along_x * x + along_y * y
         corners, faces, slots = _cut(corners, at, faces, slots)
     return corners, faces, slots
 
@@ -225,68 +235,82 @@ def _cut(corners: Array, at: Array, faces: Ints, slots: Ints) -> tuple[Array, In
         faces: Indices [m, 3].
         slots: Any value of each triangle [m].
     """
-    done_faces, done_slots = [], []
+    done = []
     near = np.round(at)
     at = np.where(np.abs(at - near) < _NEAR, near, at)
-    while len(faces):
-        # Corner by corner: reductions over the short axis of [m, 3] take ten times as long.
-        x, y, z = (at.take(faces[:, k]) for k in range(3))
+    # Corner by corner: numpy is slow on the short axis of [m, 3].
+    a, b, c = (np.ascontiguousarray(faces[:, k]) for k in range(3))
+    while len(slots):
+        x, y, z = _taken(at, a, b, c)
         low, high = np.minimum(np.minimum(x, y), z), np.maximum(np.maximum(x, y), z)
         first, last = np.floor(low) + 1.0, np.ceil(high) - 1.0
-        crossing = first <= last
-        done_faces.append(faces[~crossing])
-        done_slots.append(slots[~crossing])
-        if not crossing.any():
+        done.append([of.take(np.flatnonzero(first > last)) for of in (a, b, c, slots)])
+        crossing = np.flatnonzero(first <= last)
+        if not len(crossing):
             break
-        faces, slots = faces[crossing], slots[crossing]
-        line = np.round(0.5 * (low + high))[crossing]
-        line = np.minimum(np.maximum(line, first[crossing]), last[crossing])
-        a, b, c = _alone_first(faces, *(of[crossing] - line for of in (x, y, z)))
-        corners, at, ab = _split(corners, at, a, b, line)
-        corners, at, ac = _split(corners, at, a, c, line)
+        line = np.minimum(np.maximum(np.round(0.5 * (low + high)), first), last).take(crossing)
+        a, b, c, slots = (of.take(crossing) for of in (a, b, c, slots))
+        a, b, c = _alone_first((a, b, c), [height - line for height in _taken(at, a, b, c)])
+        one, ab = _meetings(at, a, b, line, len(at))
+        other, ac = _meetings(at, a, c, line, len(at) + len(one))
+        corners, at = _with_meetings(corners, at, np.concatenate([one, other]))
         # A corner on the line leaves a part without area.
         parts = ((a, ab, ac), (ab, b, c), (ab, c, ac))
-        whole = [(i != j) & (j != k) & (k != i) for i, j, k in parts]
-        faces = np.concatenate(
-            [np.stack(part, axis=1)[kept] for part, kept in zip(parts, whole, strict=True)]
-        )
-        slots = np.concatenate([slots[kept] for kept in whole])
-    return corners, np.concatenate(done_faces), np.concatenate(done_slots)
+        whole = [np.flatnonzero((i != j) & (j != k) & (k != i)) for i, j, k in parts]
+        pieces = [
+            [of.take(kept) for of in (*part, slots)]
+            for part, kept in zip(parts, whole, strict=True)
+        ]
+        a, b, c, slots = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    a, b, c, slots = (np.concatenate(column) for column in zip(*done, strict=True))
+    return corners, np.stack([a, b, c], axis=1), slots
 
 
-def _alone_first(faces: Ints, x: Array, y: Array, z: Array) -> tuple[Ints, Ints, Ints]:
+def _taken(values: Array, *corners: Ints) -> list[Array]:
+    """Values at each corner [m] of triangles."""
+    return [values.take(corner) for corner in corners]
+
+
+def _alone_first(corners: Sequence[Ints], heights: Sequence[Array]) -> tuple[Ints, Ints, Ints]:
     """Corners of triangles, turned until the first one is alone on its side of a line.
 
     Of corners above, on and below the line, one side has a single corner, and the other one or two.
 
     Args:
-        faces: Indices [m, 3].
-        x: Heights [m] of the first corners above the line.
-        y: Heights [m] of the second corners.
-        z: Heights [m] of the third corners.
+        corners: Indices of the first, second and third corners, [m] each.
+        heights: Of these corners above the line, [m] each.
     """
-    above = (x > 0.0, y > 0.0, z > 0.0)
+    a, b, c = corners
+    above = [height > 0.0 for height in heights]
     is_above = above[0].astype(np.int8) + above[1] + above[2] == 1
     first, second = (
-        np.where(is_above, over, height < 0.0) for over, height in zip(above, (x, y), strict=False)
+        np.where(is_above, over, height < 0.0)
+        for over, height in zip(above[:2], heights[:2], strict=True)
     )
-    turn = np.where(first, 0, np.where(second, 1, 2))
-    rows = np.arange(len(faces))
-    a, b, c = (faces[rows, (turn + k) % 3] for k in range(3))
-    return a, b, c
+
+    def pick(of_first: Ints, of_second: Ints, of_third: Ints) -> Ints:
+        return np.where(first, of_first, np.where(second, of_second, of_third))
+
+    return pick(a, b, c), pick(b, c, a), pick(c, a, b)
 
 
-def _split(corners: Array, at: Array, a: Ints, b: Ints, line: Array) -> tuple[Array, Array, Ints]:
-    """Corners with those added where edges meet lines, and the number of each edge's.
+def _meetings(at: Array, a: Ints, b: Ints, line: Array, count: int) -> tuple[Array, Ints]:
+    """Corners where edges meet lines, as rows of two ends and a line; the number of each edge's.
 
-    Edges that two triangles share get one corner.
+    Edges that two triangles share get one corner; new ones are numbered from ``count`` on.
     """
     low, high = np.minimum(a, b), np.maximum(a, b)
     key = (low * len(at) + high) * 2**20 + (line.astype(np.int64) + 2**19)
     _, first, which = np.unique(key, return_index=True, return_inverse=True)
-    low, high, line = low[first], high[first], line[first]
-    share = ((line - at[low]) / (at[high] - at[low]))[:, None]
-    made = corners[low] + share * (corners[high] - corners[low])
-    on = at[b] == line[which.ravel()]
-    number = np.where(on, b, len(at) + which.ravel())
-    return np.concatenate([corners, made]), np.concatenate([at, line]), number
+    number = np.where(at.take(b) == line, b, count + which.ravel())
+    return np.stack([low.take(first), high.take(first), line.take(first)], axis=1), number
+
+
+def _with_meetings(corners: Array, at: Array, meetings: Array) -> tuple[Array, Array]:
+    """Corners, and the function at them, with those added where edges meet lines."""
+    (low, high), line = meetings[:, :2].T.astype(np.int64), meetings[:, 2]
+    start, made = corners.take(low, axis=0), corners.take(high, axis=0)
+    made -= start
+    made *= ((line - at.take(low)) / (at.take(high) - at.take(low)))[:, None]
+    made += start
+    return np.concatenate([corners, made]), np.concatenate([at, line])

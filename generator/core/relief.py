@@ -214,10 +214,9 @@ class Relief:
     def height(self, points_m: Array) -> Array:
         """Heights [n] of the ground at places [n, 2 or more], x and y first."""
         grid = _sampled(self)
-        i, j, u, v = grid.find(points_m)
-        z = grid.heights_m
-        here = z[i, j]
-        east, north, cross = z[i + 1, j] - here, z[i, j + 1] - here, z[i + 1, j + 1] - here
+        corners, u, v = grid.find(points_m)
+        here, north_z, east_z, cross_z = (grid.heights_m.take(corner) for corner in corners)
+        east, north, cross = east_z - here, north_z - here, cross_z - here
         # The diagonal of a cell runs from its corner of least to that of largest x and y.
         lower: Array = u * east + v * (cross - east)
         upper: Array = v * north + u * (cross - north)
@@ -227,12 +226,15 @@ class Relief:
     def gradient(self, points_m: Array) -> Array:
         """Slopes [n, 2] along x and y of the smooth ground, for shading."""
         grid = _sampled(self)
-        i, j, u, v = grid.find(points_m)
-        slopes, u, v = grid.slopes, u[:, None], v[:, None]
-        near = (1.0 - u) * slopes[i, j] + u * slopes[i + 1, j]
-        far = (1.0 - u) * slopes[i, j + 1] + u * slopes[i + 1, j + 1]
-        blended: Array = (1.0 - v) * near + v * far
-        return blended
+        corners, u, v = grid.find(points_m)
+
+        def blended(slope: Array) -> Array:
+            here, north, east, cross = (slope.take(corner) for corner in corners)
+            near, far = (1.0 - u) * here + u * east, (1.0 - u) * north + u * cross
+            mixed: Array = (1.0 - v) * near + v * far
+            return mixed
+
+        return np.stack([blended(slope) for slope in grid.slopes], axis=1)
 
     def numbers(self) -> tuple[float, ...]:
         """All values in a row, for ids of assets; before its bends each road has their number."""
@@ -284,22 +286,32 @@ class _Grid:
     Attributes:
         first: Numbers of the first node along x and y; node k is at ``k * CELL_M``.
         heights_m: [m, n].
-        slopes: Along x and y, [m, n, 2].
+        slopes: Along x and along y, [2, m, n].
     """
 
     first: Array
     heights_m: Array
     slopes: Array
 
-    def find(self, points_m: Array) -> tuple[Ints, Ints, Array, Array]:
-        """Cells of places [n, 2 or more], and where in them they are; outside, at the rim."""
-        last = np.array(self.heights_m.shape) - 1.0
-        at = np.asarray(points_m, np.float64)[:, :2] / CELL_M - self.first
-        at = np.clip(at, 0.0, last)
-        cell = np.minimum(np.floor(at), last - 1.0)
-        u, v = (at - cell).T
-        i, j = cell.astype(np.int64).T
-        return i, j, u, v
+    def find(self, points_m: Array) -> tuple[tuple[Ints, Ints, Ints, Ints], Array, Array]:
+        """Cells of places [n, 2 or more], and where in them they are; outside, at the rim.
+
+        Returns:
+            Numbers [n] in the flat grid of a cell's corners: of least x and y, north, east, and
+            north-east of it; and shares [n] of the cell along x and y.
+        """
+        points = np.asarray(points_m, np.float64)
+        cells, shares = [], []
+        # Axis by axis: numpy is slow on the short axis of [n, 2].
+        for axis, count in enumerate(self.heights_m.shape):
+            at = points[:, axis] / CELL_M - self.first[axis]
+            at = np.minimum(np.maximum(at, 0.0), count - 1.0)
+            cell = np.minimum(np.floor(at), count - 2.0)
+            cells.append(cell.astype(np.int64))
+            shares.append(at - cell)
+        width = self.heights_m.shape[1]
+        here = cells[0] * width + cells[1]
+        return (here, here + 1, here + width, here + width + 1), shares[0], shares[1]
 
 
 @lru_cache(maxsize=4)
@@ -314,5 +326,5 @@ def _sampled(relief: Relief) -> _Grid:
     total = sum(weight for _, weight in weighed)
     # Rounded as poses are: the same bits on every processor.
     heights = np.round(sum(height * weight for height, weight in weighed) / total, 6)
-    slopes = np.stack([np.gradient(heights, CELL_M, axis=k) for k in (0, 1)], axis=2)
+    slopes = np.stack([np.gradient(heights, CELL_M, axis=k) for k in (0, 1)])
     return _Grid(first, heights, slopes)
