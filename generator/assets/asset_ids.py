@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 from gen_data.core.errors import AssetError
 
@@ -36,6 +37,10 @@ class AssetId:
 
     def __str__(self) -> str:
         """The canonical form."""
+        return self._text
+
+    @cached_property
+    def _text(self) -> str:
         if not self.parameters:
             return self.name
         pairs = (
@@ -44,8 +49,9 @@ class AssetId:
         return f"{self.name}?{'&'.join(pairs)}"
 
 
+@lru_cache(maxsize=1024)
 def parse_asset_id(text: str) -> AssetId:
-    """Parse an asset id.
+    """Parse an asset id; the latest are kept, since a scene asks for each of its assets often.
 
     Raises:
         AssetError: if it is malformed.
