@@ -25,6 +25,7 @@ from benchmarks.real_figures import real_figures
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.capture import Channel
+from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth
 from gen_data.exporters.kitti import Kitti, label_rows
 from gen_data.lab.study.real_pictures import read_image
@@ -34,6 +35,8 @@ Pixels = Mapping[Channel, NDArray[Any]]
 
 FOCAL_PX = 721.5
 """Focal length of KITTI's rectified cameras."""
+ROWS = 375
+"""Rows of KITTI's images."""
 SHRUNK = 3
 """Factor between the sizes of pictures without and with ``--light``."""
 ENDS_PX = (0.0, 25.0, 48.0, 96.0, 192.0, math.inf)
@@ -65,13 +68,26 @@ class Labelled:
     truncation: float
 
     @classmethod
-    def of(cls, row: str, focal_px: float) -> "Labelled | None":
-        """The object of a row; None for other kinds."""
+    def of(cls, row: str, focal_px: float, middle_px: float) -> "Labelled | None":
+        """The object of a row; None for other kinds, and above or below the rows of KITTI.
+
+        Args:
+            row: Line of a label file.
+            focal_px: Focal length.
+            middle_px: Image row in the middle of those that KITTI would have.
+        """
         kind, truncation, _, _, left, top, right, bottom, h, w, length, x, y, z, _ = row.split()
         if kind not in KINDS:
             return None
         scale = FOCAL_PX / focal_px
-        size_px = (float(right) - float(left)) * scale, (float(bottom) - float(top)) * scale
+        # Higher images show near cars whole, of which KITTI's cut off the lower part.
+        high, low = (
+            min(max((float(edge) - middle_px) * scale, -0.5 * ROWS), 0.5 * ROWS)
+            for edge in (top, bottom)
+        )
+        if high >= low:
+            return None
+        size_px = (float(right) - float(left)) * scale, low - high
         away_m = math.hypot(float(x), float(z))
         size_m = (float(length), float(w), float(h))
         return cls(KINDS[kind], size_px, size_m, away_m, float(y), float(truncation))
@@ -155,7 +171,7 @@ def pictures_of_config(
             again = None
             for number in range(views):
                 rows, truth, _ = small.look(accepted, number)
-                picture = _picture(rows, truth.camera.intrinsics.fx_px)
+                picture = _picture(rows, truth.camera.intrinsics)
                 if full and any(thing.kind == "people" for thing in picture.objects):
                     again = again or full.pipeline.accepted_scene(scene)
                     picture = _with_light(picture, *full.look(again, number))
@@ -163,8 +179,10 @@ def pictures_of_config(
             yield pictures
 
 
-def _picture(rows: Sequence[str], focal_px: float) -> Picture:
-    found = (Labelled.of(row, focal_px) for row in rows)
+def _picture(rows: Sequence[str], lens: Intrinsics | None = None) -> Picture:
+    """Objects of label rows, of a picture with that lens or of KITTI's."""
+    focal_px, middle_px = (lens.fx_px, 0.5 * lens.height_px) if lens else (FOCAL_PX, 0.5 * ROWS)
+    found = (Labelled.of(row, focal_px, middle_px) for row in rows)
     return Picture(tuple(thing for thing in found if thing is not None))
 
 
@@ -202,7 +220,7 @@ def pictures_of_kitti(folder: Path, n: int) -> Iterator[Picture]:
         rows = path.read_text().splitlines()
         image = folder / f"image_2/{path.stem}.png"
         grey = grey_levels(read_image(image)) if image.is_file() else None
-        picture = _picture(rows, FOCAL_PX)
+        picture = _picture(rows)
         yield picture if grey is None else replace(picture, boxes=grey_in_boxes(grey, rows))
 
 

@@ -12,7 +12,7 @@ decide.
 
 import argparse
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -88,6 +88,15 @@ def _deviation(values: Sequence[float]) -> float:
     return float(np.std(known)) if len(known) > 1 else math.nan
 
 
+def _with_rare_counts(figures: Mapping[str, Figure], pictures: int) -> dict[str, Figure]:
+    """Counts of objects a picture, whose errors are at least one object in all pictures."""
+    return {
+        name: Figure(one.value, max(one.error, 1.0 / pictures))
+        for name, one in figures.items()
+        if name.endswith(" px")
+    }
+
+
 def summarise_scans(scans: Sequence[bench_scans.ScanFigures]) -> dict[str, float]:
     """Figures of scans without the columns that only ours have."""
     return {name: value for name, (value, *_) in bench_scans.summarise(scans).items()}
@@ -101,7 +110,9 @@ def measure_column(config: str, given: Sequence[str], n: int, light: int, scans:
     sensors = load_config(config, overrides=list(given)).sensors
     has_scanner = any(getattr(sensor, "model", None) == SCANNER for sensor in sensors)
     swept = measure_scans(config, range(scans), given) if has_scanner and scans else []
-    figures = bootstrap([*bright, *rest], bench_pictures.summarise)
+    found = [*bright, *rest]
+    figures = bootstrap(found, bench_pictures.summarise)
+    figures |= _with_rare_counts(figures, sum(map(len, found)))
     figures |= bootstrap(swept, summarise_scans)
     return Column(config, figures, {"pictures": n, "light": light, "scans": len(swept)})
 

@@ -8,8 +8,10 @@ import pytest
 from PIL import Image
 
 from benchmarks.bench_pictures import (
+    FOCAL_PX,
     REAL,
     Grey,
+    Labelled,
     grey_in_boxes,
     grey_levels,
     pictures_of_kitti,
@@ -71,3 +73,18 @@ def test_the_greys_of_real_pictures_are_read_next_to_their_labels(tmp_path: Path
 
     assert figures["people: mean grey in boxes"] == pytest.approx(40.0)
     assert figures["people: dark pixels in boxes"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("top", "bottom", "height_px"),
+    [(100.0, 400.0, 275.0), (200.0, 300.0, 100.0), (380.0, 600.0, None)],
+)
+def test_boxes_end_where_the_images_of_kitti_do(
+    top: float, bottom: float, height_px: float | None
+) -> None:
+    """375 rows around row 187.5 end at 375; here everything is twice as large and 200 px lower."""
+    row = f"Car 0 0 0 0.0 {2 * top + 200} 60.0 {2 * bottom + 200} 1.5 1.6 4.0 3 1.7 4 0"
+
+    found = Labelled.of(row, 2 * FOCAL_PX, 2 * 187.5 + 200)
+
+    assert (None if found is None else found.size_px[1]) == height_px
