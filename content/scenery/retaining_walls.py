@@ -33,7 +33,7 @@ def retaining_wall(seed: int, style: str) -> Solid:
     rng = variant_rng(f"retaining_wall/{kind}", seed)
     high, thick = rng.between(0.6, 1.8, "height_m"), rng.between(0.25, 0.4, "thickness_m")
     lean = 0.0 if kind in ("concrete", "rendered") else _BATTER * high
-    wall = _along_y([(0.0, 0.0), (-lean, high), (-lean - thick, high), (-lean - thick, 0.0)])
+    wall = _along_y([(0.0, 0.0), (-lean, high), (-lean - thick, high), (-lean - thick, 0.0)], 0.012)
     behind = -lean - thick
     rise, shelf = rng.between(0.1, 0.5, "rise_m"), rng.between(1.0, 1.8, "shelf_m")
     soil = high - 0.06
@@ -56,10 +56,10 @@ def retaining_wall_facts(seed: int, style: str) -> Facts:
     return Facts(choose_option("retaining_wall", "style", style, WALLS, seed))
 
 
-def _along_y(section: list[tuple[float, float]]) -> Patch:
+def _along_y(section: list[tuple[float, float]], bevel_m: float = 0.0) -> Patch:
     """A prism along Y of a section in x and z."""
     outline = np.array([(x, z) for x, z in section])
-    return extrude(outline, 2.0 * HALF_M).rotated("x", 0.5 * np.pi).moved(y=HALF_M)
+    return extrude(outline, 2.0 * HALF_M, bevel_m).rotated("x", 0.5 * np.pi).moved(y=HALF_M)
 
 
 def _coping(kind: str, front: float, thick: float, high: float) -> list[Patch]:
