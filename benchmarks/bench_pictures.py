@@ -4,7 +4,8 @@ Pictures come from the first step of every view of a configuration, or (``--kitt
 ``label_2`` of KITTI's object format. Objects are the rows of KITTI's labels: image boxes around the
 projected 3D box, ``DontCare`` left out. Heights are in pixels of KITTI's camera (focal length
 721.5 px): pictures of our cameras are rendered small, since labels need few pixels. ``--light``
-adds the grey levels of people, at full size, which takes ten times as long.
+adds grey levels: pictures with people are rendered again at full size. Real labels have no
+silhouettes, so real figures are of the boxes.
 
 The column ``real`` is of ``street_figures.yaml``.
 """
@@ -12,7 +13,8 @@ The column ``real`` is of ``street_figures.yaml``.
 import argparse
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +25,18 @@ from benchmarks.real_figures import real_figures
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.capture import Channel
+from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth
 from gen_data.exporters.kitti import Kitti, label_rows
+from gen_data.lab.study.real_pictures import read_image
+from gen_data.pipeline.pipeline import AcceptedScene, Pipeline
+
+Pixels = Mapping[Channel, NDArray[Any]]
 
 FOCAL_PX = 721.5
 """Focal length of KITTI's rectified cameras."""
+ROWS = 375
+"""Rows of KITTI's images."""
 SHRUNK = 3
 """Factor between the sizes of pictures without and with ``--light``."""
 ENDS_PX = (0.0, 25.0, 48.0, 96.0, 192.0, math.inf)
@@ -59,37 +68,79 @@ class Labelled:
     truncation: float
 
     @classmethod
-    def of(cls, row: str, focal_px: float) -> "Labelled | None":
-        """The object of a row; None for other kinds."""
+    def of(cls, row: str, focal_px: float, middle_px: float) -> "Labelled | None":
+        """The object of a row; None for other kinds, and above or below the rows of KITTI.
+
+        Args:
+            row: Line of a label file.
+            focal_px: Focal length.
+            middle_px: Image row in the middle of those that KITTI would have.
+        """
         kind, truncation, _, _, left, top, right, bottom, h, w, length, x, y, z, _ = row.split()
         if kind not in KINDS:
             return None
         scale = FOCAL_PX / focal_px
-        size_px = (float(right) - float(left)) * scale, (float(bottom) - float(top)) * scale
+        # Higher images show near cars whole, of which KITTI's cut off the lower part.
+        high, low = (
+            min(max((float(edge) - middle_px) * scale, -0.5 * ROWS), 0.5 * ROWS)
+            for edge in (top, bottom)
+        )
+        if high >= low:
+            return None
+        size_px = (float(right) - float(left)) * scale, low - high
         away_m = math.hypot(float(x), float(z))
         size_m = (float(length), float(w), float(h))
         return cls(KINDS[kind], size_px, size_m, away_m, float(y), float(truncation))
 
 
 @dataclass(frozen=True, slots=True)
+class Grey:
+    """Pixels, how many of them are dark, and the sum of their grey levels."""
+
+    pixels: int = 0
+    dark: int = 0
+    total: float = 0.0
+
+    @classmethod
+    def of(cls, levels: NDArray[np.float64]) -> "Grey":
+        """Grey levels [n] of some pixels."""
+        return cls(levels.size, int((levels < DARK).sum()), float(levels.sum()))
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
-    """Objects of a picture, and the grey levels of the pixels that show people."""
+    """Objects of a picture, and the pixels in the boxes of people, and those that show people."""
 
     objects: tuple[Labelled, ...]
-    grey: tuple[int, ...] = ()
+    boxes: Grey = Grey()
+    silhouettes: Grey = Grey()
 
 
-def pictures_of_config(
-    name: str, scenes: Iterable[int], given: Sequence[str], *, light: bool
-) -> Iterator[list[Picture]]:
-    """Pictures of each of these scenes by the first camera, one step of each view."""
-    config = load_config(name, overrides=given)
+@dataclass(frozen=True, eq=False, slots=True)
+class _Camera:
+    """The first camera of a configuration with a size, and the style of its labels."""
+
+    pipeline: Pipeline
+    name: str
+    style: Kitti
+
+    def look(self, accepted: AcceptedScene, number: int) -> tuple[list[str], ImageTruth, Pixels]:
+        """Rows of the label file of a view, its truth, and its channels."""
+        sensors = [s for s in accepted.sensors if s.name == self.name]
+        sample = self.pipeline.read_sensors(self.pipeline.drawn_view(accepted, number), sensors, 0)
+        truth = sample.truth[self.name]
+        rows = [row for row, _ in label_rows(truth, self.style)]
+        return rows, truth, sample.capture.readings[self.name].channels
+
+
+@contextmanager
+def _camera(name: str, given: Sequence[str], shrunk: int, channels: str) -> Iterator[_Camera]:
+    """The first camera of a configuration, its pictures smaller by a factor."""
+    config = load_config(name, overrides=list(given))
     camera = next(s for s in config.sensors if hasattr(s, "size_px"))
-    shrunk = 1 if light else SHRUNK
-    size_px = [side // shrunk for side in camera.size_px]
     changes = [
-        f"sensors.{camera.name}.size_px={size_px}",
-        f"sensors.{camera.name}.channels=[{'rgb, ' if light else ''}instance, category]",
+        f"sensors.{camera.name}.size_px={[side // shrunk for side in camera.size_px]}",
+        f"sensors.{camera.name}.channels=[{channels}]",
         f"labels.min_visible_px={16 // shrunk**2}",
         f"labels.min_box_px={3 // shrunk}",
         "annotations=[boxes2d, boxes3d, visibility]",
@@ -99,37 +150,78 @@ def pictures_of_config(
     kitti = next((e for e in config.exporters if isinstance(e, Kitti)), Kitti(far_m=64))
     style = kitti.model_copy(update={"low_px": math.ceil(kitti.low_px / shrunk)})
     with open_pipeline(load_config(name, overrides=[*given, *changes])) as pipeline:
+        yield _Camera(pipeline, camera.name, style)
+
+
+def pictures_of_config(
+    name: str, scenes: Iterable[int], given: Sequence[str], *, light: bool
+) -> Iterator[list[Picture]]:
+    """Pictures of each of these scenes by the first camera, one step of each view.
+
+    With ``light`` pictures with people are rendered again at full size.
+    """
+    views = load_config(name, overrides=list(given)).general.views_per_scene
+    with (
+        _camera(name, given, SHRUNK, "instance, category") as small,
+        _camera(name, given, 1, "rgb, instance, category") if light else nullcontext() as full,
+    ):
         for scene in scenes:
             pictures = []
-            accepted = pipeline.accepted_scene(scene)
-            sensors = [s for s in accepted.sensors if s.name == camera.name]
-            for number in range(config.general.views_per_scene):
-                view = pipeline.drawn_view(accepted, number)
-                sample = pipeline.read_sensors(view, sensors, 0)
-                truth = sample.truth[camera.name]
-                pixels = sample.capture.readings[camera.name].channels
-                grey = _grey_of_people(truth, pixels) if light else ()
-                rows = [row for row, _ in label_rows(truth, style)]
-                pictures.append(_picture(rows, truth.camera.intrinsics.fx_px, grey))
+            accepted = small.pipeline.accepted_scene(scene)
+            again = None
+            for number in range(views):
+                rows, truth, _ = small.look(accepted, number)
+                picture = _picture(rows, truth.camera.intrinsics)
+                if full and any(thing.kind == "people" for thing in picture.objects):
+                    again = again or full.pipeline.accepted_scene(scene)
+                    picture = _with_light(picture, *full.look(again, number))
+                pictures.append(picture)
             yield pictures
 
 
-def _picture(rows: Sequence[str], focal_px: float, grey: tuple[int, ...] = ()) -> Picture:
-    found = (Labelled.of(row, focal_px) for row in rows)
-    return Picture(tuple(thing for thing in found if thing is not None), grey)
+def _picture(rows: Sequence[str], lens: Intrinsics | None = None) -> Picture:
+    """Objects of label rows, of a picture with that lens or of KITTI's."""
+    focal_px, middle_px = (lens.fx_px, 0.5 * lens.height_px) if lens else (FOCAL_PX, 0.5 * ROWS)
+    found = (Labelled.of(row, focal_px, middle_px) for row in rows)
+    return Picture(tuple(thing for thing in found if thing is not None))
 
 
-def _grey_of_people(truth: ImageTruth, pixels: Mapping[Channel, NDArray[Any]]) -> tuple[int, ...]:
+def _with_light(
+    picture: Picture, rows: Sequence[str], truth: ImageTruth, pixels: Pixels
+) -> Picture:
+    """The picture with the grey levels of its people."""
     seen = (thing.instance for thing in truth.objects)
     people = [one.instance_id for one in seen if one.category in ("person", "pedestrian")]
-    rgb = pixels[Channel.RGB][np.isin(pixels[Channel.INSTANCE], people)]
-    return tuple(np.rint(rgb @ (0.299, 0.587, 0.114)).astype(int).tolist())
+    grey = grey_levels(pixels[Channel.RGB])
+    shown = Grey.of(grey[np.isin(pixels[Channel.INSTANCE], people)])
+    return replace(picture, boxes=grey_in_boxes(grey, rows), silhouettes=shown)
+
+
+def grey_levels(rgb: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Grey levels [h, w] of a picture [h, w, 3]."""
+    levels: NDArray[np.float64] = rgb @ np.array([0.299, 0.587, 0.114])
+    return levels
+
+
+def grey_in_boxes(grey: NDArray[np.float64], rows: Sequence[str]) -> Grey:
+    """Pixels [h, w] in the boxes of people, each counted once, by rows of a label file."""
+    inside = np.zeros(grey.shape, np.bool_)
+    for row in rows:
+        kind, *_, left, top, right, bottom = row.split()[:8]
+        if KINDS.get(kind) == "people":
+            x0, y0 = (max(0, math.floor(float(edge))) for edge in (left, top))
+            inside[y0 : math.floor(float(bottom)) + 1, x0 : math.floor(float(right)) + 1] = True
+    return Grey.of(grey[inside])
 
 
 def pictures_of_kitti(folder: Path, n: int) -> Iterator[Picture]:
-    """The first ``n`` label files of a folder in KITTI's object format."""
+    """The first ``n`` label files of a folder in KITTI's object format, with its images if any."""
     for path in sorted((folder / "label_2").glob("*.txt"))[:n]:
-        yield _picture(path.read_text().splitlines(), FOCAL_PX)
+        rows = path.read_text().splitlines()
+        image = folder / f"image_2/{path.stem}.png"
+        grey = grey_levels(read_image(image)) if image.is_file() else None
+        picture = _picture(rows)
+        yield picture if grey is None else replace(picture, boxes=grey_in_boxes(grey, rows))
 
 
 def summarise(pictures: Sequence[Picture]) -> dict[str, float]:
@@ -159,9 +251,13 @@ def summarise(pictures: Sequence[Picture]) -> dict[str, float]:
         for share in shares:
             at = float(np.percentile(values, share)) if values else math.nan
             figures[f"{name}, p{share}{unit}"] = at
-    grey = np.concatenate([np.array(picture.grey, np.int64) for picture in pictures])
-    figures["people: dark pixels"] = float((grey < DARK).mean()) if len(grey) else math.nan
-    figures["people: mean grey"] = float(grey.mean()) if len(grey) else math.nan
+    for where in ("boxes", "silhouettes"):
+        pixels, dark, total = (
+            sum(getattr(getattr(picture, where), part) for picture in pictures)
+            for part in ("pixels", "dark", "total")
+        )
+        figures[f"people: dark pixels in {where}"] = dark / pixels if pixels else math.nan
+        figures[f"people: mean grey in {where}"] = total / pixels if pixels else math.nan
     return figures
 
 

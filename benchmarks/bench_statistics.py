@@ -1,18 +1,18 @@
 """Statistics of streets next to real ones: ``python -m benchmarks.bench_statistics --n 60``.
 
 One table of the rows of ``bench_pictures`` and ``bench_scans``, for one or more configurations:
-pictures of ``--n`` scenes, grey levels of people in the first ``--light`` of them, which are
-rendered at full size, and scans of the first ``--scans`` by a KITTI scanner, in clear weather,
-with one scene a frame. Each figure has its standard error by a bootstrap over scenes. A row
-is ``out`` beyond the range of ``street_figures.yaml`` by two standard errors or more, and ``?``
-beyond it by less: more scenes decide.
+pictures of ``--n`` scenes, grey levels of people in the first ``--light`` of them, and scans of
+the first ``--scans`` by KITTI's scanner, in clear weather, with one scene a frame. Each figure has
+its standard error by a bootstrap over scenes. A row is ``out`` beyond the range of
+``street_figures.yaml`` by two standard errors or more, and ``?`` beyond it by less: more scenes
+decide.
 
 ``--out FILE`` adds the table in Markdown to the end of a file.
 """
 
 import argparse
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -88,6 +88,15 @@ def _deviation(values: Sequence[float]) -> float:
     return float(np.std(known)) if len(known) > 1 else math.nan
 
 
+def _with_rare_counts(figures: Mapping[str, Figure], pictures: int) -> dict[str, Figure]:
+    """Counts of objects a picture, whose errors are at least one object in all pictures."""
+    return {
+        name: Figure(one.value, max(one.error, 1.0 / pictures))
+        for name, one in figures.items()
+        if name.endswith(" px")
+    }
+
+
 def summarise_scans(scans: Sequence[bench_scans.ScanFigures]) -> dict[str, float]:
     """Figures of scans without the columns that only ours have."""
     return {name: value for name, (value, *_) in bench_scans.summarise(scans).items()}
@@ -101,7 +110,9 @@ def measure_column(config: str, given: Sequence[str], n: int, light: int, scans:
     sensors = load_config(config, overrides=list(given)).sensors
     has_scanner = any(getattr(sensor, "model", None) == SCANNER for sensor in sensors)
     swept = measure_scans(config, range(scans), given) if has_scanner and scans else []
-    figures = bootstrap([*bright, *rest], bench_pictures.summarise)
+    found = [*bright, *rest]
+    figures = bootstrap(found, bench_pictures.summarise)
+    figures |= _with_rare_counts(figures, sum(map(len, found)))
     figures |= bootstrap(swept, summarise_scans)
     return Column(config, figures, {"pictures": n, "light": light, "scans": len(swept)})
 
@@ -109,7 +120,7 @@ def measure_column(config: str, given: Sequence[str], n: int, light: int, scans:
 def format_table(columns: Sequence[Column]) -> str:
     """The table in Markdown: real figures, and ours with their standard errors and verdicts."""
     heads = [
-        f"`{c.config}` ({c.scenes['pictures']} scenes, {c.scenes['light']} in full size, "
+        f"`{c.config}` ({c.scenes['pictures']} scenes, {c.scenes['light']} with light, "
         f"{c.scenes['scans']} scans)"
         for c in columns
     ]
@@ -119,7 +130,8 @@ def format_table(columns: Sequence[Column]) -> str:
         for name, value in real.rows.items():
             cells = [_format_cell(real, name, c.figures.get(name)) for c in columns]
             if any(cells):
-                lines.append(f"| {name} | {value:.4g} | {' | '.join(cells)} |")
+                known = "" if math.isnan(value) else f"{value:.4g}"
+                lines.append(f"| {name} | {known} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
@@ -127,7 +139,7 @@ def _format_cell(real: RealFigures, name: str, ours: Figure | None) -> str:
     if ours is None or math.isnan(ours.value):
         return ""
     verdict = judge(real, name, ours.value, ours.error)
-    mark = "" if verdict == "in" else f" **{verdict}**"
+    mark = f" **{verdict}**" if verdict in ("out", "?") else ""
     return f"{ours.value:.3g} ± {ours.error:.1g}{mark}"
 
 
@@ -136,7 +148,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--config", nargs="+", default=["street.yaml", "kitti_rig.yaml"])
     parser.add_argument("--n", type=int, default=60, help="scenes whose pictures are counted")
-    parser.add_argument("--light", type=int, default=0, help="scenes rendered at full size")
+    parser.add_argument("--light", type=int, default=0, help="scenes with grey levels of people")
     parser.add_argument("--scans", type=int, default=0, help="scenes whose scans are measured")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--workers", type=int, default=1, help="configurations at a time")

@@ -17,7 +17,7 @@ class RealFigures:
     Attributes:
         asked: Largest relative deviation of ours.
         least: Deviation that is in range whatever the figure [its unit].
-        rows: Figures by name.
+        rows: Figures by name; NaN = unknown.
     """
 
     asked: float
@@ -38,7 +38,7 @@ def real_figures(kind: str) -> RealFigures:
 
 
 def judge(figures: RealFigures, name: str, ours: float, error: float) -> str:
-    """``in``, ``out``, ``?`` = out by less than two standard errors, or ``-`` = not measured.
+    """``in``, ``out``, ``?`` = out by less than two standard errors, or ``-`` = not comparable.
 
     Args:
         figures: The real figures.
@@ -46,7 +46,7 @@ def judge(figures: RealFigures, name: str, ours: float, error: float) -> str:
         ours: Our figure; NaN = not measured.
         error: Its standard error [its unit]; NaN = unknown.
     """
-    if math.isnan(ours):
+    if math.isnan(ours) or math.isnan(figures.rows[name]):
         return "-"
     excess = figures.excess(name, ours)
     if excess == 0.0:

@@ -63,7 +63,8 @@ class LaneObjects(GroupRandomizer):
         roads: Names of the elements whose lanes to use; empty = all.
         gap_m: Gap between neighbours along a lane, or between runs.
         run_m: Length of a run: the same asset again and again without gaps, such as the fence of
-            one garden; 0 = every object is drawn by itself.
+            one garden, whose pieces overlap in bends if ``min_clearance_m`` is 0; 0 = every object
+            is drawn by itself.
         passes: Number of times to fill every lane: several passes let people walk abreast.
         occupancy: Whether a place is occupied; its probability is how full a parking lane is.
         fade_m: Distance from the ego vehicle over which the share of occupied places falls to 1/e:
@@ -169,6 +170,7 @@ class LaneObjects(GroupRandomizer):
         for line in lines * self.passes:
             at_m = float(rng.uniform()) * self.gap_m.draw(rng)
             run = self._draw_run(at_m, weights, bounds_of, rng)
+            joined: list[free_space.Footprint] = []
             for _ in range(PER_LANE_MAX):
                 asset, scale, bounds_m, solid_m = run.thing
                 length_m, width_m = _extent_m(bounds_m, group.facing)
@@ -185,12 +187,20 @@ class LaneObjects(GroupRandomizer):
                     place = place @ SE3((0.0, 0.0, -_land_fall_m(behind_m)))
                     pose = pose_on_lane(place, line.lane, bounds_m, group.facing, turn)
                     pose = pose.rounded()
-                    if self._occupy(ground, pose, solid_m):
+                    footprint = free_space.Footprint.of(pose, solid_m)
+                    if ground.is_free(footprint.expand(self.min_clearance_m)):
+                        # On the inside of bends, pieces of one fence overlap at their backs.
+                        if run.used is None or self.min_clearance_m > 0.0:
+                            ground.add(footprint)
+                        else:
+                            joined.append(footprint)
                         yield Member(asset, pose, scale, collides=False)
                 at_m += length_m
                 if at_m < run.end_m:
                     at_m += JOINT_M
                 else:
+                    _add_all(ground, joined)
+                    joined = []
                     at_m += self.gap_m.draw(rng)
                     run = self._draw_run(at_m, weights, bounds_of, rng)
             else:
@@ -199,6 +209,7 @@ class LaneObjects(GroupRandomizer):
                     f"{line.length_m:.1f} m has more than {PER_LANE_MAX:,} places; expected a "
                     "larger gap_m or scale"
                 )
+            _add_all(ground, joined)
 
     def _scatter(
         self,
@@ -249,6 +260,11 @@ class LaneObjects(GroupRandomizer):
         if scale != 1.0:
             bounds_m, solid_m = _scale_bounds(bounds_m, scale), _scale_bounds(solid_m, scale)
         return asset, scale, bounds_m, solid_m
+
+
+def _add_all(ground: free_space.Ground, footprints: list[free_space.Footprint]) -> None:
+    for footprint in footprints:
+        ground.add(footprint)
 
 
 def _bounds_m(assets: interfaces.AssetIndex, asset: str) -> tuple[Bounds, Bounds]:

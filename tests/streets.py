@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from gen_data.assemble.config import Config, load_config
 
 SCENERY = (
-    "buildings", "back_row", "paths", "poles", "lamps", "trees", "fronts", "garden_cars",
-    "garden_trees", "garden_plants", "back_trees", "weeds", "furniture", "signs", "bins", "cafes",
-    "stalls", "billboards", "two_wheelers", "road_works", "scaffolds", "trailers", "trams",
-    "waiting_cyclists", "belongings", "umbrellas",
+    "buildings", "back_row", "retaining_walls", "paths", "poles", "lamps", "trees", "fronts",
+    "garden_cars", "garden_trees", "garden_plants", "back_trees", "weeds", "furniture", "signs",
+    "bins", "cafes", "stalls", "billboards", "two_wheelers", "road_works", "scaffolds", "trailers",
+    "trams", "waiting_cyclists", "belongings", "umbrellas",
 )  # fmt: skip
 """Randomizers of ``street.yaml`` that place what stands beside the road."""
 FEW = (

@@ -3,9 +3,20 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
-from benchmarks.bench_pictures import REAL, pictures_of_kitti, summarise
+from benchmarks.bench_pictures import (
+    FOCAL_PX,
+    REAL,
+    Grey,
+    Labelled,
+    grey_in_boxes,
+    grey_levels,
+    pictures_of_kitti,
+    summarise,
+)
 
 ROWS = """\
 Car 0.00 0 0.00 100.00 150.00 160.00 190.00 1.50 1.60 4.00 3.00 1.70 4.00 0.00
@@ -31,5 +42,49 @@ def test_figures_of_label_files_are_those_of_a_count_by_hand(tmp_path: Path) -> 
     assert figures["people: width / height, p50"] == 0.4
     assert figures["people: distance, p50 [m]"] == pytest.approx(10.0)
     assert figures["cars: length, p50 [m]"] == pytest.approx(3.5)
-    assert math.isnan(figures["people: mean grey"])
+    assert math.isnan(figures["people: mean grey in boxes"])
     assert set(figures) == set(REAL)
+
+
+def test_grey_levels_are_of_pixels_in_boxes_of_people_each_counted_once() -> None:
+    """Two boxes of 2 x 2 pixels share one: seven pixels, of which one is dark; the rest is red."""
+    grey = np.full((4, 6), 50.0)
+    grey[1, 1] = 24.9
+    rows = [
+        "Pedestrian 0 0 0 1.00 1.00 2.00 2.00 1.8 0.6 0.9 6 1.6 8 0",
+        "Pedestrian 0 0 0 2.00 2.00 3.00 3.00 1.8 0.6 0.9 6 1.6 8 0",
+        "Car 0 0 0 0.00 0.00 5.00 3.00 1.8 0.6 0.9 6 1.6 8 0",
+    ]
+
+    assert grey_in_boxes(grey, rows) == Grey(7, 1, 24.9 + 6 * 50.0)
+    red = np.zeros((1, 1, 3), np.uint8)
+    red[..., 0] = 200
+    assert grey_levels(red)[0, 0] == pytest.approx(59.8)
+
+
+def test_the_greys_of_real_pictures_are_read_next_to_their_labels(tmp_path: Path) -> None:
+    """A picture of grey 40: all of its person's 41 x 101 pixels are 40, and none is dark."""
+    (tmp_path / "label_2").mkdir()
+    (tmp_path / "image_2").mkdir()
+    (tmp_path / "label_2/000000.txt").write_text(ROWS)
+    Image.new("RGB", (600, 300), (40, 40, 40)).save(tmp_path / "image_2/000000.png")
+
+    figures = summarise(list(pictures_of_kitti(tmp_path, 1)))
+
+    assert figures["people: mean grey in boxes"] == pytest.approx(40.0)
+    assert figures["people: dark pixels in boxes"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("top", "bottom", "height_px"),
+    [(100.0, 400.0, 275.0), (200.0, 300.0, 100.0), (380.0, 600.0, None)],
+)
+def test_boxes_end_where_the_images_of_kitti_do(
+    top: float, bottom: float, height_px: float | None
+) -> None:
+    """375 rows around row 187.5 end at 375; here everything is twice as large and 200 px lower."""
+    row = f"Car 0 0 0 0.0 {2 * top + 200} 60.0 {2 * bottom + 200} 1.5 1.6 4.0 3 1.7 4 0"
+
+    found = Labelled.of(row, 2 * FOCAL_PX, 2 * 187.5 + 200)
+
+    assert (None if found is None else found.size_px[1]) == height_px

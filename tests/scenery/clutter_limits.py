@@ -18,6 +18,7 @@ class Limits(NamedTuple):
 CLUTTER = {
     "fence": Limits((0.03, 0.25), (1.99, 2.02), (0.8, 1.9), 12),
     "garden_wall": Limits((0.2, 0.6), (1.99, 2.02), (0.6, 1.9), 6),
+    "retaining_wall": Limits((2.0, 6.0), (2.99, 3.01), (0.55, 2.9), 15),
     "utility_pole": Limits((34.9, 35.1), (1.85, 1.95), (8.8, 10.0), 4),
     "power_box": Limits((0.2, 1.9), (0.4, 2.7), (0.9, 2.2), 6),
     "wheelie_bin": Limits((0.5, 1.8), (0.45, 1.5), (0.9, 2.3), 6),
