@@ -38,21 +38,13 @@ from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import SE3
-from gen_data.exporters import base, image_files, nuscenes_classes
+from gen_data.exporters import base, image_files, nuscenes_classes, sensor_selection
 from gen_data.exporters.argoverse_map import argoverse_map
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.nuscenes_frames import annotated_things, rig_pose_at
 from gen_data.exporters.nuscenes_recording import PAUSE_US, START_US
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.road_map import road_map
-from gen_data.exporters.sensor_selection import (
-    check_pinholes,
-    has_scans,
-    instant_s,
-    laser_scanner,
-    rgb_cameras,
-    stamp_s,
-)
 from gen_data.exporters.sequences import (
     Frame,
     Mount,
@@ -122,24 +114,23 @@ class Argoverse2(base.AssetExporter):
                 class in this format, or a package is missing.
         """
         base.check_installed(self.type, "pyarrow", "shapely")
-        if not laser_scanner(info, self.lidar, self.type):
+        if not sensor_selection.laser_scanner(info, self.lidar, self.type):
             raise ConfigError(
                 f"exporter '{self.type}': there is no lidar; add a sensor of that type, such as "
                 "{type: lidar, name: up_lidar, model: VLP-32C}"
             )
-        check_pinholes(info, rgb_cameras(info), self.type)
+        sensor_selection.check_pinholes(info, sensor_selection.rgb_cameras(info), self.type)
         things = nuscenes_classes.classes().things.items()
         known = [ours for ours, theirs in things if theirs in CLASSES and "/" not in ours]
         base.check_classes(self.type, info, known)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write scans and maps, and a line per sample.
-
-        Raises:
-            ConfigError: see ``check``.
-        """
+        """Write scans and maps, and a line per sample. Raises ConfigError as ``check`` does."""
         self.check(info)
-        lidar, folder = laser_scanner(info, self.lidar, self.type), shard_dir / self.type
+        lidar, folder = (
+            sensor_selection.laser_scanner(info, self.lidar, self.type),
+            shard_dir / self.type,
+        )
         rows = []
         mapped: set[int] = set()
         for sample in samples:
@@ -148,7 +139,7 @@ class Argoverse2(base.AssetExporter):
                 roads = argoverse_map(road_map(sample.scene, self.library))
                 write_json(folder / _map_file(sample.scene_index), roads)
             row = _row(info, sample, lidar)
-            if has_scans(shard_dir, lidar, sample.index):
+            if sensor_selection.has_scans(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
                 T_ego_lidar = _pose_of(row["mounts"][lidar])
                 sweep_s = sample.scene.lidar(lidar).sweep_s
@@ -191,7 +182,7 @@ class Argoverse2(base.AssetExporter):
         world = frames[0].row["scene"]
         target = folder / f"map/log_map_archive_{folder.name}____{CITY}_city_{world}.json"
         image_files.link_or_copy(frames[0].shard_dir / self.type / _map_file(world), target)
-        scanner = mounts.pop(laser_scanner(info, self.lidar, self.type))
+        scanner = mounts.pop(sensor_selection.laser_scanner(info, self.lidar, self.type))
         mounts |= dict.fromkeys(LIDARS, scanner)
         poses = [{"sensor_name": name, **mounts[name]} for name in sorted(mounts)]
         _write_table(folder / "calibration/egovehicle_SE3_sensor.feather", poses, POSE)
@@ -275,15 +266,15 @@ def _row(info: DatasetInfo, sample: Sample, lidar: str) -> Row:
     ego = lidar_mount(scene, lidar).rig
     mounts = {lidar: relative_pose(scene, Mount(ego, SE3()), lidar_mount(scene, lidar))}
     lenses = {}
-    read = {lidar: stamp_s(sample, lidar)}
-    for name in rgb_cameras(info):
+    read = {lidar: sensor_selection.stamp_s(sample, lidar)}
+    for name in sensor_selection.rgb_cameras(info):
         if name in sample.truth:
             mounts[name] = relative_pose(scene, Mount(ego, SE3()), camera_mount(scene, name))
             lens = sample.truth[name].camera.intrinsics
             values = (lens.fx_px, lens.fy_px, lens.cx_px - 0.5, lens.cy_px - 0.5, 0.0, 0.0, 0.0,
                       lens.height_px, lens.width_px)  # fmt: skip
             lenses[name] = dict(zip(INTRINSICS, values, strict=True))
-            read[name] = stamp_s(sample, name)
+            read[name] = sensor_selection.stamp_s(sample, name)
     return frame_facts(info, sample) | {
         "scene": sample.scene_index,
         "mounts": {name: _pose_row(pose) for name, pose in mounts.items()},
@@ -299,7 +290,7 @@ def _row(info: DatasetInfo, sample: Sample, lidar: str) -> Row:
 
 def _boxes(sample: Sample, lidar: str, points: NDArray[np.void]) -> Iterable[Row]:
     """Boxes in the ego's frame at the true instant of a sweep: they fit its points."""
-    time_s, ego = instant_s(sample, lidar), lidar_mount(sample.scene, lidar).rig
+    time_s, ego = sensor_selection.instant_s(sample, lidar), lidar_mount(sample.scene, lidar).rig
     T_ego_world = rig_pose_at(sample.scene, ego, time_s).rounded(9).inverse()
     counts = np.bincount(points["instance_id"].astype(np.int64), minlength=1)
     own = _ego_instance(sample, lidar)

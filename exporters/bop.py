@@ -150,7 +150,8 @@ class Bop(base.AssetExporter):
         """Number the models, link models and images, and write the JSON files of each folder."""
         camera = sensor_selection.pinhole_camera(info, self.camera, self.type)
         ids = _write_models([d / self.type for d in shard_dirs], dataset_dir)
-        write_text(dataset_dir / "dataset_info.md", _dataset_info(info, camera, len(ids)))
+        text = _DATASET_INFO.format(name=info.name, camera=camera, models=len(ids))
+        write_text(dataset_dir / "dataset_info.md", text)
         targets: list[dict[str, int]] = []
         rows = fragments.fragment_rows(shard_dirs, self.type, IMAGES)
         size = self._folder_size(info)
@@ -447,10 +448,6 @@ def _camera_json(row: Mapping[str, Any]) -> str:
     width, height = row["size"]
     facts = {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": width, "height": height}
     return canonical_json({**facts, "depth_scale": row["camera"]["depth_scale"]}) + "\n"
-
-
-def _dataset_info(info: DatasetInfo, camera: str, models: int) -> str:
-    return _DATASET_INFO.format(name=info.name, camera=camera, models=models)
 
 
 _DATASET_INFO = """\

@@ -240,11 +240,7 @@ def _outline(
 
 
 def camera_facts(scene: Scene, camera: str, right: str) -> dict[str, Any]:
-    """Content of a camera file.
-
-    Raises:
-        ConfigError: the cameras are not a rectified pair.
-    """
+    """Content of a camera file. Raises ConfigError if the cameras are not a rectified pair."""
     view = scene.camera(camera)
     pose = camera_mount(scene, camera).T_rig_sensor @ scene_time.RIG_AXES
     r = pose.rotation()

@@ -35,16 +35,10 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters import base, label_colors, label_png, label_regions
+from gen_data.exporters import base, fragments, label_colors, label_png, label_regions
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
-from gen_data.exporters.fragments import (
-    fragment_lines,
-    fragment_rows,
-    image_splits,
-    write_fragments,
-)
 from gen_data.exporters.image_files import link_or_copy, link_photograph
 from gen_data.exporters.sensor_selection import check_channels, photographs
 from gen_data.exporters.sequences import write_bytes
@@ -98,15 +92,15 @@ class CocoPanoptic(base.AssetExporter):
             rows.setdefault(f"{sample.split}.images", []).append(row)
         listed = (s["category"] for lines in rows.values() for line in lines for s in line["stuff"])
         stuff = [{"name": name} for name in sorted(set(listed))]
-        write_fragments(shard_dir / self.type, {**rows, "stuff": stuff})
+        fragments.write_fragments(shard_dir / self.type, {**rows, "stuff": stuff})
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the categories of stuff, join the lines of all shards, and link the images."""
         folders = [shard_dir / self.type for shard_dir in shard_dirs]
-        names = {json.loads(line)["name"] for line in fragment_lines(folders, "stuff")}
+        names = {json.loads(line)["name"] for line in fragments.fragment_lines(folders, "stuff")}
         categories = _categories(info.categories, sorted(names))
         ids = {category["name"]: category["id"] for category in categories}
-        splits = image_splits(folders)
+        splits = fragments.image_splits(folders)
         (dataset_dir / "annotations").mkdir(parents=True, exist_ok=True)
         for split in splits:
             stem = f"{split}.images"
@@ -114,10 +108,10 @@ class CocoPanoptic(base.AssetExporter):
             write_dataset(
                 path,
                 dataset_header(info, categories, self.conventions),
-                map(_image_line, fragment_lines(folders, stem)),
-                _annotation_lines(fragment_lines(folders, stem), ids),
+                map(_image_line, fragments.fragment_lines(folders, stem)),
+                _annotation_lines(fragments.fragment_lines(folders, stem), ids),
             )
-            for shard_dir, row in fragment_rows(shard_dirs, self.type, stem):
+            for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, stem):
                 name = row["file_name"]
                 link_or_copy(shard_dir / self.type / name, path.with_suffix("") / name)
                 link_photograph(info, shard_dir, row, dataset_dir / split / row["photograph"])

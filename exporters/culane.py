@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.exporters import base, fragments, image_files
+from gen_data.exporters import base, fragments, image_files, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.lane_lines import (
     ABSENT,
@@ -43,13 +43,6 @@ from gen_data.exporters.lane_lines import (
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.road_map import StreetExporter
 from gen_data.exporters.sensor_selection import check_channels, photographs
-from gen_data.exporters.sequences import (
-    FRAMES,
-    sequence_number,
-    write_bytes,
-    write_frames,
-    write_text,
-)
 
 MASKS = "laneseg_label_w16"
 ROWS_PX, WIDTH_PX = 10, 16
@@ -85,12 +78,14 @@ class CULane(StreetExporter):
             size = sample.truth[sensor].camera.intrinsics
             points = {line.side: row_points(line, size.height_px) for line in found if line.side}
             lines = {side: places for side, places in points.items() if places}
-            segment = f"segment-{sequence_number(info, sample.index):06d}_{sensor}"
+            segment = f"segment-{sequences.sequence_number(info, sample.index):06d}_{sensor}"
             name, folder = f"{sample.split}/{segment}/{sample.index:09d}", shard_dir / self.type
             texts = [" ".join(f"{x:g} {y}" for x, y in lines[side]) for side in sorted(lines)]
-            write_text(folder / f"{name}.lines.txt", "".join(f"{text}\n" for text in texts))
+            sequences.write_text(
+                folder / f"{name}.lines.txt", "".join(f"{text}\n" for text in texts)
+            )
             mask = line_mask(lines, (size.height_px, size.width_px))
-            write_bytes(folder / MASKS / f"{name}.png", encode_png(mask, RowFilter.UP, 2))
+            sequences.write_bytes(folder / MASKS / f"{name}.png", encode_png(mask, RowFilter.UP, 2))
             rows.append(
                 {
                     "sample": sample.index,
@@ -100,12 +95,12 @@ class CULane(StreetExporter):
                     "exists": [int(side in lines) for side in SIDES],
                 }
             )
-        write_frames(shard_dir / self.type, rows)
+        sequences.write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link images, texts and masks, and list them."""
         lists: dict[str, list[str]] = {}
-        for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, FRAMES):
+        for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, sequences.FRAMES):
             name, folder = row["name"], shard_dir / self.type
             image, mask = f"{name}{row['suffix']}", f"{MASKS}/{name}.png"
             image_files.link_photograph(info, shard_dir, row, dataset_dir / image)
@@ -115,7 +110,7 @@ class CULane(StreetExporter):
             lists.setdefault(split, []).append(f"/{image}\n")
             lists.setdefault(f"{split}_gt", []).append(f"/{image} /{mask} {exists}\n")
         for name, lines in lists.items():
-            write_text(dataset_dir / f"list/{name}.txt", "".join(lines))
+            sequences.write_text(dataset_dir / f"list/{name}.txt", "".join(lines))
 
 
 def row_points(line: LaneLine, height_px: int) -> list[tuple[float, int]]:

@@ -347,7 +347,7 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
         return dont_care(thing.box, k)
     instance = thing.instance
     kind = official_type(instance) if style.types == "official" else _join_words(instance.category)
-    alpha_rad = _wrap_angle(box.heading_rad - math.atan2(x, z))
+    alpha_rad = math.remainder(box.heading_rad - math.atan2(x, z), 2.0 * math.pi)
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
     truncation, corners = thing.truncation, _format_corners(thing.box)
     if style.boxes == "projected":
@@ -453,10 +453,6 @@ def _format_corners(box: BoxPx) -> str:
 def _format_decimal(value: float) -> str:
     # Micrometres: with KITTI's own two decimals, small objects lose precision. No "-0.000000".
     return f"{round(value, 6) + 0.0:.6f}"
-
-
-def _wrap_angle(angle_rad: float) -> float:
-    return math.remainder(angle_rad, 2.0 * math.pi)
 
 
 def _join_words(name: str) -> str:

@@ -23,18 +23,18 @@ UInt8 = NDArray[np.uint8]
 UInt16 = NDArray[np.uint16]
 Int64 = NDArray[np.int64]
 
-_ZLIB_HEADER = b"\x78\x01"
-_ADLER_BASE = 65_521
+ZLIB_HEADER = b"\x78\x01"
+ADLER_BASE = 65_521
 
-_END, _FIRST_LENGTH, _SYMBOLS = 256, 257, 286
-_LONGEST, _SHORTEST = 258, 3
+END, _FIRST_LENGTH, _SYMBOLS = 256, 257, 286
+LONGEST, SHORTEST = 258, 3
 _LENGTH_EXTRA_BITS = (0,) * 8 + (1,) * 4 + (2,) * 4 + (3,) * 4 + (4,) * 4 + (5,) * 4
 """Extra bits of the length codes 257 to 284."""
 _CODE_BITS_MAX = 15
 _NODE_BITS, _NODE_MASK = 10, 1023
 """Bits of the numbers of nodes in Huffman's tree, of which there are fewer than 1024."""
 
-_COPY_PIXEL, _COPY_ZERO, _TOKENS = 512, 1024, 1536
+_COPY_PIXEL, COPY_ZERO, TOKENS = 512, 1024, 1536
 """Tokens: literals below 256, the end, copies of k bytes from a pixel before (512 + k), and from a
 byte before (1024 + k)."""
 
@@ -124,7 +124,7 @@ def _compress(runs: _Runs, rows: int, stride: int) -> bytes:
     zeros = np.append(begin[1:], size) - end
     tokens = _tokens(literals, is_head, copied, zeros)
     check = _adler32(runs, heads, size)
-    return _ZLIB_HEADER + _pack(tokens, step) + check.to_bytes(4, "big")
+    return ZLIB_HEADER + _pack(tokens, step) + check.to_bytes(4, "big")
 
 
 def _tokens(
@@ -133,21 +133,21 @@ def _tokens(
     """Tokens of the stream: per pixel or head its literals, copies of it, and zeros."""
     count, step = literals.shape
     # Copies have at least three bytes; what is left is repeated literally.
-    copies, rest = np.divmod(copied, _LONGEST)
-    gap_copies, gap_rest = np.divmod(np.maximum(zeros - 1, 0), _LONGEST)
-    short, gap_short = rest < _SHORTEST, gap_rest < _SHORTEST
+    copies, rest = np.divmod(copied, LONGEST)
+    gap_copies, gap_rest = np.divmod(np.maximum(zeros - 1, 0), LONGEST)
+    short, gap_short = rest < SHORTEST, gap_rest < SHORTEST
     kinds = np.zeros((count, 2 * step + 5), np.int64)
     times = np.zeros_like(kinds)
     kinds[:, :step] = kinds[:, step : 2 * step] = literals
     times[:, 0], times[:, 1:step] = 1, ~is_head[:, None]
     times[:, step : 2 * step] = (short * rest // step)[:, None]
-    near = _COPY_ZERO if step == 1 else _COPY_PIXEL
-    kinds[:, -5], times[:, -5] = near + _LONGEST, copies
+    near = COPY_ZERO if step == 1 else _COPY_PIXEL
+    kinds[:, -5], times[:, -5] = near + LONGEST, copies
     kinds[:, -4], times[:, -4] = near + rest, ~short
     kinds[:, -3], times[:, -3] = 0, (zeros > 0) + gap_short * gap_rest
-    kinds[:, -2], times[:, -2] = _COPY_ZERO + _LONGEST, gap_copies
-    kinds[:, -1], times[:, -1] = _COPY_ZERO + gap_rest, ~gap_short
-    return np.append(np.repeat(kinds.ravel(), times.ravel()), _END)
+    kinds[:, -2], times[:, -2] = COPY_ZERO + LONGEST, gap_copies
+    kinds[:, -1], times[:, -1] = COPY_ZERO + gap_rest, ~gap_short
+    return np.append(np.repeat(kinds.ravel(), times.ravel()), END)
 
 
 def _adler32(runs: _Runs, heads: Int64, size: int) -> int:
@@ -159,25 +159,25 @@ def _adler32(runs: _Runs, heads: Int64, size: int) -> int:
     # A byte counts as often as there are bytes from it to the end.
     for k in range(step):
         often = pixels * (size - runs.begin - k) - step * (pixels * (pixels - 1) // 2)
-        high += int((often % _ADLER_BASE * literals[:, k]).sum())
-    return (high % _ADLER_BASE) << 16 | low % _ADLER_BASE
+        high += int((often % ADLER_BASE * literals[:, k]).sum())
+    return (high % ADLER_BASE) << 16 | low % ADLER_BASE
 
 
 def _pack(tokens: Int64, step: int) -> bytes:
     """One block of deflate with the dynamic codes of its tokens."""
-    symbol, extra, extra_bits = _token_table()
+    symbol, extra, extra_bits = token_table()
     counts = np.bincount(symbol[tokens], minlength=_SYMBOLS)
     lengths = _code_lengths(counts.tolist())
-    codes = _canonical_codes(lengths)
+    codes = canonical_codes(lengths)
     # A distance is one bit: 0 = the byte before, 1 = the pixel before.
-    kind = np.arange(_TOKENS)
+    kind = np.arange(TOKENS)
     is_copy = kind >= _COPY_PIXEL
-    distance = is_copy & (kind < _COPY_ZERO)
+    distance = is_copy & (kind < COPY_ZERO)
     bits = lengths[symbol]
     value = codes[symbol] | extra << bits | distance << (bits + extra_bits)
     size = bits + extra_bits + is_copy
     head_values, head_sizes = _header(lengths, step)
-    return _join_bits(
+    return join_bits(
         np.concatenate([head_values, value[tokens]]), np.concatenate([head_sizes, size[tokens]])
     )
 
@@ -193,7 +193,7 @@ def _header(lengths: Int64, step: int) -> tuple[Int64, Int64]:
     return np.concatenate([values, both]), np.concatenate([sizes, np.full(len(both), 4)])
 
 
-def _join_bits(values: Int64, sizes: Int64) -> bytes:
+def join_bits(values: Int64, sizes: Int64) -> bytes:
     """Join fields of at most 32 bits, the lowest bit first."""
     end = np.cumsum(sizes)
     word, shift = np.divmod(end - sizes, 32)
@@ -207,16 +207,16 @@ def _join_bits(values: Int64, sizes: Int64) -> bytes:
 
 
 @cache
-def _token_table() -> tuple[Int64, Int64, Int64]:
+def token_table() -> tuple[Int64, Int64, Int64]:
     """Symbol, extra bits and their number, of every token."""
-    symbol, extra, extra_bits = (np.zeros(_TOKENS, np.int64) for _ in range(3))
-    symbol[: _END + 1] = np.arange(_END + 1)
-    length = _SHORTEST
+    symbol, extra, extra_bits = (np.zeros(TOKENS, np.int64) for _ in range(3))
+    symbol[: END + 1] = np.arange(END + 1)
+    length = SHORTEST
     spans = [*enumerate(_LENGTH_EXTRA_BITS, _FIRST_LENGTH), (_SYMBOLS - 1, 0)]
     for code, bits in spans:
         # The longest copy has a code of its own.
-        length = _LONGEST if code == _SYMBOLS - 1 else length
-        for base in (_COPY_PIXEL, _COPY_ZERO):
+        length = LONGEST if code == _SYMBOLS - 1 else length
+        for base in (_COPY_PIXEL, COPY_ZERO):
             covered = slice(base + length, base + length + (1 << bits))
             symbol[covered], extra_bits[covered] = code, bits
             extra[covered] = np.arange(1 << bits)
@@ -257,7 +257,7 @@ def _leaf_depths(counts: Sequence[int]) -> list[int]:
     return depths[: len(counts)]
 
 
-def _canonical_codes(lengths: Int64) -> Int64:
+def canonical_codes(lengths: Int64) -> Int64:
     """Codes by symbol, with the first bit lowest; 0 for symbols without one."""
     codes = np.zeros_like(lengths)
     order = np.argsort(lengths, kind="stable")

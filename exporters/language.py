@@ -164,12 +164,7 @@ def _utterances(sample: Sample, sensor: str) -> list[tuple[str, Utterance]]:
 
 
 def _line(
-    info: DatasetInfo,
-    sample: Sample,
-    sensor: str,
-    kind: str,
-    said: Utterance,
-    with_polygons: bool,
+    info: DatasetInfo, sample: Sample, sensor: str, kind: str, said: Utterance, with_polygons: bool
 ) -> dict[str, Any] | None:
     """A line; None if it is about a second image that does not show all of its objects."""
     line: dict[str, Any] = {

@@ -128,11 +128,7 @@ class LeRobot(base.AssetExporter):
                 )
 
     def check_scene(self, scene: Scene) -> None:
-        """Reject scenes without the arm.
-
-        Raises:
-            ConfigError: the scene has no such arm.
-        """
+        """Reject scenes without the arm. Raises ConfigError if the scene has no such arm."""
         self._find_arms(scene)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

@@ -41,23 +41,13 @@ from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.core.se3 import SE3, Array
-from gen_data.exporters import base, image_files
+from gen_data.exporters import base, image_files, sequences
 from gen_data.exporters.argoverse2 import CLASSES, feather_bytes, time_ns_of
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.npz import npz_bytes
 from gen_data.exporters.nuscenes_classes import category_of
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.sensor_selection import has_scans, instant_s, laser_scanner, stamp_s
-from gen_data.exporters.sequences import (
-    Frame,
-    Mount,
-    frame_facts,
-    lidar_mount,
-    read_sequences,
-    relative_pose,
-    write_bytes,
-    write_frames,
-)
 
 Layout = Literal["kitti", "av2"]
 INDICES: Mapping[str, int] = {
@@ -137,7 +127,7 @@ class LidarFlow(base.AssetExporter):
             if not has_scans(shard_dir, lidar, sample.index):
                 continue
             points = read_points(shard_dir, lidar, sample.index)
-            row = frame_facts(info, sample) | {"time_s": stamp_s(sample, lidar)}
+            row = sequences.frame_facts(info, sample) | {"time_s": stamp_s(sample, lidar)}
             rows.append(row)
             arrays = {"position_m": points["position_m"]}
             if row["step"] + period_steps < info.steps_per_scene:
@@ -149,30 +139,32 @@ class LidarFlow(base.AssetExporter):
                 arrays |= {"flow_m": flow.flow_m.astype(np.float32), "valid": flow.valid}
                 if "av2" in self.layouts:
                     data = annotation_bytes(now, lidar, points, flow)
-                    write_bytes(folder / f"{sample.index:09d}.feather", data)
+                    sequences.write_bytes(folder / f"{sample.index:09d}.feather", data)
             if "kitti" in self.layouts:
-                write_bytes(_scan_path(folder, sample.index), npz_bytes(arrays, LEVEL))
-        write_frames(folder, rows)
+                sequences.write_bytes(_scan_path(folder, sample.index), npz_bytes(arrays, LEVEL))
+        sequences.write_frames(folder, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write a file for every pair of scans that follow each other."""
         dataset_dir.mkdir(parents=True, exist_ok=True)
         period_steps = _period_steps(info, laser_scanner(info, self.lidar, self.type))
-        for number, frames in read_sequences(shard_dirs, self.type).items():
+        for number, frames in sequences.read_sequences(shard_dirs, self.type).items():
             for frame, later in pairwise(frames):
                 if later.index - frame.index != period_steps:
                     continue
                 split, folder = frame.row["split"], frame.shard_dir / self.type
                 if "kitti" in self.layouts:
                     name = f"{number:06d}_{frame.row['step']:06d}.npz"
-                    write_bytes(dataset_dir / "kitti" / split / name, self._pair(frame, later))
+                    sequences.write_bytes(
+                        dataset_dir / "kitti" / split / name, self._pair(frame, later)
+                    )
                 if "av2" in self.layouts:
                     log = f"{info.name}-{number:06d}"
                     name = f"{time_ns_of(info, number, frame.row['time_s'])}.feather"
                     source = folder / f"{frame.index:09d}.feather"
                     image_files.link_or_copy(source, dataset_dir / "av2" / split / log / name)
 
-    def _pair(self, frame: Frame, later: Frame) -> bytes:
+    def _pair(self, frame: sequences.Frame, later: sequences.Frame) -> bytes:
         one, two = (np.load(_scan_path(f.shard_dir / self.type, f.index)) for f in (frame, later))
         valid = one["valid"]
         pair = {
@@ -228,8 +220,8 @@ def annotation_bytes(scene: Scene, lidar: str, points: NDArray[np.void], flow: S
     """Encode an annotation of Argoverse 2's challenge; ``scene`` is at the scan's instant."""
     import pyarrow as pa
 
-    mount = lidar_mount(scene, lidar, true=True)
-    T_ego_lidar = relative_pose(scene, Mount(mount.rig, SE3()), mount)
+    mount = sequences.lidar_mount(scene, lidar, true=True)
+    T_ego_lidar = sequences.relative_pose(scene, sequences.Mount(mount.rig, SE3()), mount)
     p_ego = T_ego_lidar.apply(points["position_m"].astype(np.float64))
     flow_ego = np.asarray(T_ego_lidar.rotate(flow.flow_m)).astype(np.float32)
     numbers = np.zeros(np.iinfo(np.uint16).max + 1, np.uint8)

@@ -74,11 +74,7 @@ class MapVectors(StreetExporter):
         self._ego(scene)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write a line per sample.
-
-        Raises:
-            ConfigError: see ``check`` and ``check_scene``.
-        """
+        """Write a line per sample. Raises ConfigError as ``check`` and ``check_scene`` do."""
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
         latest: tuple[tuple[Lane, ...], dict[str, list[Geometry]]] | None = None
@@ -137,11 +133,7 @@ class MapVectors(StreetExporter):
         return points
 
     def _ego(self, scene: Scene) -> str:
-        """Name of the rig.
-
-        Raises:
-            ConfigError: there is none of that name.
-        """
+        """Name of the rig. Raises ConfigError if there is none of that name."""
         known = [rig.name for rig in scene.rigs]
         name = self.rig or next(iter(known), "")
         if name not in known:

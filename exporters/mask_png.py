@@ -11,25 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.core.sample import MaskPx
+from gen_data.exporters import label_png
 from gen_data.exporters.png import assemble_png
 
 INSIDE = 255
 
-_LONGEST = 258
-"""Longest copy of RFC 1951."""
-_SHORTEST = 3
-_TOKEN_BITS = 20
-"""No token has more bits: a length code of 8, extra bits of 5, a distance code of 5."""
-
-_LENGTH_EXTRA_BITS = (0,) * 8 + (1,) * 4 + (2,) * 4 + (3,) * 4 + (4,) * 4 + (5,) * 4
-"""Extra bits of the length codes 257 to 284."""
-
-_ADLER_MODULUS = 65521
-
-_ZLIB_HEADER = b"\x78\x01"
-
-Bits = str
-"""Bits in the order of the stream."""
+Int64 = NDArray[np.int64]
 
 
 def encode_mask(mask: MaskPx | None, height_px: int, width_px: int) -> bytes:
@@ -48,11 +35,11 @@ def encode_mask(mask: MaskPx | None, height_px: int, width_px: int) -> bytes:
         checksum = adler32_of_runs(borders, size)
     lengths = np.diff(np.append(borders, size), prepend=0)
     lengths = lengths[: len(lengths) - (lengths[-1] == 0)]
-    data = _ZLIB_HEADER + _deflate_runs(lengths) + checksum.to_bytes(4, "big")
+    data = label_png.ZLIB_HEADER + _deflate_runs(lengths) + checksum.to_bytes(4, "big")
     return assemble_png(height_px, width_px, data)
 
 
-def adler32_of_runs(borders: NDArray[np.int64], size: int) -> int:
+def adler32_of_runs(borders: Int64, size: int) -> int:
     """Adler-32 checksum of ``size`` bytes that alternate between 0 and 255 at the borders.
 
     Source: RFC 1950, section 8.2: sums of the bytes, and of all partial sums, modulo 65521. A byte
@@ -66,83 +53,32 @@ def adler32_of_runs(borders: NDArray[np.int64], size: int) -> int:
     counts = last - first
     # Sum of size - i over the bytes i of each run of 255.
     partial = counts * (2 * size - first - last + 1) // 2
-    low = (1 + INSIDE * int(counts.sum())) % _ADLER_MODULUS
-    high = (size + INSIDE * int(partial.sum())) % _ADLER_MODULUS
+    low = (1 + INSIDE * int(counts.sum())) % label_png.ADLER_BASE
+    high = (size + INSIDE * int(partial.sum())) % label_png.ADLER_BASE
     return high << 16 | low
 
 
-def _deflate_runs(lengths: NDArray[np.int64]) -> bytes:
+def _deflate_runs(lengths: Int64) -> bytes:
     """Deflate alternate runs of 0 and 255, zeros first, as one block of fixed Huffman codes."""
-    inside = np.arange(len(lengths)) % 2
-    # Above and below the mask are long runs of zeros, between its rows short ones.
-    parts = [_HEADER, _long_run(int(lengths[0]), 0), _short_runs(lengths[1:-1], inside[1:-1])]
-    if len(lengths) > 1:
-        parts.append(_long_run(int(lengths[-1]), int(inside[-1])))
-    bits = np.concatenate([*parts, np.zeros(7, np.uint8)])
-    return np.packbits(bits, bitorder="little").tobytes()
-
-
-_HEADER = np.array([1, 1, 0], np.uint8)
-"""Bits of the last block, of fixed codes."""
-
-
-def _long_run(length: int, inside: int) -> NDArray[np.uint8]:
-    """Bits of one run: a literal, copies of the greatest length, and the rest."""
-    table, sizes = _tokens()
-    copies, rest = divmod(length - 1, _LONGEST)
-    ends = [_LITERAL + inside, _REST + inside * _LONGEST + rest]
-    literal, remainder = (table[row, : sizes[row]] for row in ends)
-    copy = table[_COPY, : sizes[_COPY]]
-    return np.concatenate([literal, np.tile(copy, copies), remainder])
-
-
-def _short_runs(lengths: NDArray[np.int64], inside: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Bits of several runs, of 255 where ``inside`` is 1."""
-    table, sizes = _tokens()
-    copies, rest = np.divmod(lengths - 1, _LONGEST)
-    first = np.cumsum(copies + 2) - (copies + 2)
-    rows = np.full(int((copies + 2).sum()), _COPY)
-    rows[first] = _LITERAL + inside
-    rows[first + 1 + copies] = _REST + inside * _LONGEST + rest
-    present = np.arange(_TOKEN_BITS) < sizes[rows, None]
-    bits: NDArray[np.uint8] = table[rows][present]
-    return bits
-
-
-_COPY, _LITERAL, _REST = 0, 1, 3
-"""Rows of the tokens: the longest copy; two literals; the rest of a run, by value and length."""
+    inside = INSIDE * (np.arange(len(lengths)) % 2)
+    copies, rest = np.divmod(lengths - 1, label_png.LONGEST)
+    short = rest < label_png.SHORTEST
+    longest = np.full_like(rest, label_png.COPY_ZERO + label_png.LONGEST)
+    kinds = np.stack([inside, longest, label_png.COPY_ZERO + rest, inside], axis=1)
+    times = np.stack([np.ones_like(rest), copies, ~short, short * rest], axis=1)
+    tokens = np.append(np.repeat(kinds.ravel(), times.ravel()), label_png.END)
+    values, sizes = _fixed_codes()
+    # The bits before the tokens: the last block, of fixed codes.
+    return label_png.join_bits(np.append(3, values[tokens]), np.append(3, sizes[tokens]))
 
 
 @cache
-def _tokens() -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-    """Bits of every token [n, 20], and their number [n]."""
-    tokens = [_copy(_LONGEST), _literal(0), _literal(INSIDE)]
-    for value in (0, INSIDE):
-        tokens += [_literal(value) * k for k in range(_SHORTEST)]
-        tokens += [_copy(k) for k in range(_SHORTEST, _LONGEST)]
-    table: NDArray[np.uint8] = np.zeros((len(tokens), _TOKEN_BITS), np.uint8)
-    for row, token in zip(table, tokens, strict=True):
-        row[: len(token)] = [int(bit) for bit in token]
-    return table, np.array([len(token) for token in tokens])
-
-
-def _literal(value: int) -> Bits:
-    return f"{0x30 + value:08b}" if value < 144 else f"{0x190 + value - 144:09b}"
-
-
-def _copy(length: int) -> Bits:
-    """Fixed codes of a copy from one byte before: length, its extra bits, and the distance."""
-    if length == _LONGEST:
-        return _length_code(285) + "00000"
-    base = _SHORTEST
-    for code, extra in enumerate(_LENGTH_EXTRA_BITS, 257):
-        if length < base + (1 << extra):
-            # Extra bits come with the lowest bit first, codes with the highest.
-            low_first = f"{length - base:0{extra}b}"[::-1] if extra else ""
-            return _length_code(code) + low_first + "00000"
-        base += 1 << extra
-    raise ValueError(f"a copy has 3 to 258 bytes, not {length}")
-
-
-def _length_code(code: int) -> Bits:
-    return f"{code - 256:07b}" if code < 280 else f"{0xC0 + code - 280:08b}"
+def _fixed_codes() -> tuple[Int64, Int64]:
+    """Bits of every token, lowest first, and their number, where copies are from a byte before."""
+    symbol, extra, extra_bits = label_png.token_table()
+    lengths = np.repeat([8, 9, 7, 8], [144, 112, 24, 8])
+    bits = lengths[symbol]
+    # Distances have five bits, and that of the byte before is 0.
+    distance_bits = 5 * (np.arange(label_png.TOKENS) >= label_png.COPY_ZERO)
+    values = label_png.canonical_codes(lengths)[symbol] | extra << bits
+    return values, bits + extra_bits + distance_bits

@@ -19,6 +19,7 @@ vertices of a rectilinear polygon, sorted along each line, are joined in pairs.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from operator import itemgetter
 from typing import Any, overload
 
 import numpy as np
@@ -204,7 +205,9 @@ def _follow(
     detours = []
     for place, corner in enumerate(border) if bridges else ():
         y = corners.points[corner, 1]
-        for x, hole in sorted(bridges.get(corner // 2, ()), key=_x, reverse=bool(corner % 2)):
+        for x, hole in sorted(
+            bridges.get(corner // 2, ()), key=itemgetter(0), reverse=bool(corner % 2)
+        ):
             detours.append((2 * place + 1, np.concatenate([[(x, y)], hole, hole[:1], [(x, y)]])))
     if not detours:
         return path
@@ -213,10 +216,6 @@ def _follow(
         pieces += [path[begin:end], detour]
         begin = end
     return np.concatenate([*pieces, path[begin:]])
-
-
-def _x(bridge: tuple[int, Polygon]) -> int:
-    return bridge[0]
 
 
 def _without_repeats(path: Polygon) -> Polygon:

@@ -41,6 +41,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -162,7 +163,7 @@ def _frame_row(sample: Sample) -> dict[str, Any]:
         "time_ns": _ns(scene.time_s),
         "transforms": [
             [time_ns, parent, child, *_pose_numbers(pose)]
-            for (time_ns, child), (parent, pose) in sorted(unique.items(), key=_by_time_and_frame)
+            for (time_ns, child), (parent, pose) in sorted(unique.items(), key=itemgetter(0))
         ],
         "cameras": {n: _camera_row(sample.truth[n], stamp_s) for n, stamp_s in cameras.items()},
         "lidars": {
@@ -182,10 +183,6 @@ def _arrivals(read: Mapping[str, SensorReading | PointCloud]) -> dict[str, dict[
         if copies(reading) > 1 or arrived_s(reading) != reported_s(reading)
     }
     return {"arrivals": times} if times else {}
-
-
-def _by_time_and_frame(item: tuple[tuple[int, str], Any]) -> tuple[int, str]:
-    return item[0]
 
 
 def _camera_transforms(camera: Camera, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:

@@ -48,11 +48,7 @@ class Tables(ExporterBase):
     format: Literal["csv", "npy"] = "csv"
 
     def check(self, info: DatasetInfo) -> None:
-        """Reject a data set without such a device.
-
-        Raises:
-            ConfigError: there is none.
-        """
+        """Reject a data set without such a device. Raises ConfigError if there is none."""
         if not info.devices:
             raise ConfigError(
                 "exporter 'tables': no device writes rows; add a sensor such as imu or radar"
@@ -87,11 +83,7 @@ def write_table(table: capture.Measurements, shard_dir: Path, index: int) -> Non
 
 
 def read_rows(path: Path, device: SensorInfo) -> NDArray[np.void]:
-    """Read the rows of one reading.
-
-    Raises:
-        StorageError: the file is missing or damaged.
-    """
+    """Read the rows of one reading. Raises StorageError if the file is missing or damaged."""
     try:
         rows: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:

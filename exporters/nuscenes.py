@@ -55,6 +55,7 @@ from gen_data.exporters import (
     nuscenes_can_bus,
     nuscenes_classes,
     nuscenes_tables,
+    sequences,
 )
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.nuscenes_frames import Channel
@@ -67,13 +68,6 @@ from gen_data.exporters.nuscenes_shard import (
     reading_path,
 )
 from gen_data.exporters.sensor_selection import check_pinholes, laser_scanner, rgb_cameras
-from gen_data.exporters.sequences import (
-    FRAMES,
-    Frame,
-    check_sequence_count,
-    write_frames,
-    write_json,
-)
 
 SPLITS = ("train", "val", "test")
 CAN_BUS = "can_bus"
@@ -123,7 +117,7 @@ class NuScenes(base.AssetExporter):
         if self.map_expansion:
             base.check_installed(self.type, "shapely")
         if self.can_bus:
-            check_sequence_count(info, nuscenes_can_bus.SCENES_MAX, self.type)
+            sequences.check_sequence_count(info, nuscenes_can_bus.SCENES_MAX, self.type)
 
     def check_scene(self, scene: Scene) -> None:
         """Reject a map expansion of worlds without a street.
@@ -153,7 +147,7 @@ class NuScenes(base.AssetExporter):
             rows.append(writer.write(sample))
             if self.can_bus:
                 messages.append(writer.can_messages(sample, self.library))
-        write_frames(shard_dir / self.type, rows)
+        sequences.write_frames(shard_dir / self.type, rows)
         if self.can_bus:
             fragments.write_fragment(shard_dir / self.type, CAN_BUS, messages)
 
@@ -182,11 +176,7 @@ class NuScenes(base.AssetExporter):
         nuscenes_tables.write_splits(dataset_dir / self.version, names)
 
     def top(self, info: DatasetInfo) -> str:
-        """Sensor that becomes LIDAR_TOP.
-
-        Raises:
-            ConfigError: there is none.
-        """
+        """Sensor that becomes LIDAR_TOP. Raises ConfigError if there is none."""
         named = LIDAR_TOP if not self.lidar and LIDAR_TOP in info.lidars else self.lidar
         top = laser_scanner(info, named, self.type)
         if not top:
@@ -222,9 +212,9 @@ class NuScenes(base.AssetExporter):
         self, token: nuscenes_tables.Tokens, shard_dirs: Sequence[Path]
     ) -> Iterator[Recording]:
         """Yield the sequences that have key frames; one at a time is in memory."""
-        rows = fragments.fragment_rows(shard_dirs, self.type, FRAMES)
+        rows = fragments.fragment_rows(shard_dirs, self.type, sequences.FRAMES)
         for _, group in groupby(rows, key=lambda item: item[1]["sequence"]):
-            frames = [Frame(shard_dir, row) for shard_dir, row in group]
+            frames = [sequences.Frame(shard_dir, row) for shard_dir, row in group]
             if keys := key_frames(frames, self.key_frame_s):
                 name_of = nuscenes_can_bus.scene_name if self.can_bus else scene_name
                 yield Recording(token, self.version, frames, keys, name_of)
@@ -233,7 +223,7 @@ class NuScenes(base.AssetExporter):
         self,
         tables: nuscenes_tables.TableFiles,
         token: nuscenes_tables.Tokens,
-        frame: Frame,
+        frame: sequences.Frame,
         dataset_dir: Path,
     ) -> None:
         """Add the log and the map of a world."""
@@ -264,7 +254,7 @@ def _write_can_bus(recording: Recording, shard_dirs: Sequence[Path], folder: Pat
     for kind in nuscenes_can_bus.RATES_HZ:
         messages = [message for line in lines for message in line[kind]]
         stamped = nuscenes_can_bus.stamped(messages, recording.time_us)
-        write_json(folder / f"{recording.name}_{kind}.json", list(stamped))
+        sequences.write_json(folder / f"{recording.name}_{kind}.json", list(stamped))
 
 
 def _channel_name(prefix: str, sensor: str) -> str:

@@ -120,7 +120,8 @@ def point_classes(
         scene: Scene with the instances.
         ego_id: Instance id of the ego vehicle; 0 = none.
     """
-    of_surface = np.array([_surface_index(name) for name in SURFACES], np.uint8)
+    grounds = [classes().surfaces.get(name, OTHER_GROUND) for name in SURFACES]
+    of_surface = np.array([*map(_index, grounds)], np.uint8)
     top = max((i.instance_id for i in scene.instances), default=0)
     named = np.full(max(top, int(members.max(initial=0))) + 1, _index(OTHER_THING), np.uint8)
     for thing in scene.instances:
@@ -144,7 +145,3 @@ def challenge_classes() -> NDArray[np.uint8]:
 @cache
 def _index(name: str) -> int:
     return classes().index(name)
-
-
-def _surface_index(surface: str) -> int:
-    return _index(classes().surfaces.get(surface, OTHER_GROUND))

@@ -176,10 +176,7 @@ def _road_link(plan: RoadPlan, end: str, streets: Streets) -> tuple[dict[str, st
     crossing = [streets.places[name].plan.name for name in names
                 if streets.places[name].plan.junction]  # fmt: skip
     if crossing and not plan.junction:
-        return {
-            "elementType": "junction",
-            "elementId": str(streets.junctions[crossing[0]]),
-        }, {}
+        return {"elementType": "junction", "elementId": str(streets.junctions[crossing[0]])}, {}
     if not names:
         return {}, {}
     target = streets.places[names[0]].plan
@@ -192,11 +189,7 @@ def _road_link(plan: RoadPlan, end: str, streets: Streets) -> tuple[dict[str, st
                 linked[number] = place.number
                 leads = streets.lanes[other].name in _after(plan, number, streets)
                 contact = contact or (place.entry if leads else place.exit)
-    return {
-        "elementType": "road",
-        "elementId": str(target.number),
-        "contactPoint": contact,
-    }, linked
+    return {"elementType": "road", "elementId": str(target.number), "contactPoint": contact}, linked
 
 
 def _after(plan: RoadPlan, number: int, streets: Streets) -> list[str]:

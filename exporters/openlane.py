@@ -37,7 +37,7 @@ from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene_time import RIG_AXES
 from gen_data.core.se3 import Array
-from gen_data.exporters import base, fragments, image_files
+from gen_data.exporters import base, fragments, image_files, sequences
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.lane_lines import (
     LaneLine,
@@ -49,13 +49,6 @@ from gen_data.exporters.lane_lines import (
 from gen_data.exporters.nuscenes_frames import intrinsic_rows
 from gen_data.exporters.road_map import StreetExporter
 from gen_data.exporters.sensor_selection import check_pinholes, photographs, rgb_cameras
-from gen_data.exporters.sequences import (
-    FRAMES,
-    sequence_number,
-    write_frames,
-    write_json,
-    write_text,
-)
 
 SPLITS = {"train": "training", "val": "validation", "test": "test"}
 LANES = "lane3d_1000"
@@ -92,14 +85,14 @@ class OpenLane(StreetExporter):
             suffix = info.encoding(sensor, Channel.RGB).suffix
             lines = lane_lines(sample, sensor, worlds.dividers(sample, sensor))
             content = frame(sample, sensor, lines) | {"file_path": f"{name}{suffix}"}
-            write_json(shard_dir / self.type / f"{name}.json", content)
+            sequences.write_json(shard_dir / self.type / f"{name}.json", content)
             rows.append({"sample": sample.index, "sensor": sensor, "name": name, "suffix": suffix})
-        write_frames(shard_dir / self.type, rows)
+        sequences.write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link images and files, and list them."""
         lists: dict[str, list[str]] = {}
-        for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, FRAMES):
+        for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, sequences.FRAMES):
             name = row["name"]
             source = shard_dir / self.type / f"{name}.json"
             image_files.link_or_copy(source, dataset_dir / LANES / f"{name}.json")
@@ -107,12 +100,12 @@ class OpenLane(StreetExporter):
             image_files.link_photograph(info, shard_dir, row, target)
             lists.setdefault(name.partition("/")[0], []).append(f"{name}.json\n")
         for split, names in lists.items():
-            write_text(dataset_dir / LANES / f"{split}.txt", "".join(names))
+            sequences.write_text(dataset_dir / LANES / f"{split}.txt", "".join(names))
 
 
 def _path(info: DatasetInfo, sample: Sample, sensor: str) -> str:
     """Path of a photograph below ``images``, without its suffix."""
-    segment = f"segment-{sequence_number(info, sample.index):06d}_{sensor}"
+    segment = f"segment-{sequences.sequence_number(info, sample.index):06d}_{sensor}"
     return f"{SPLITS.get(sample.split, sample.split)}/{segment}/{sample.index:09d}"
 
 

@@ -37,11 +37,7 @@ def scanner_at_sweep(sample: Sample, lidar: str) -> scene.Lidar:
 
 
 def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
-    """Read the points of one sweep.
-
-    Raises:
-        StorageError: the file is missing or damaged.
-    """
+    """Read the points of one sweep. Raises StorageError if the file is missing or damaged."""
     path = interfaces.cloud_path(shard_dir, sensor, index)
     try:
         points: NDArray[np.void] = np.load(path, allow_pickle=False)

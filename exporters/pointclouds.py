@@ -73,11 +73,7 @@ class PointClouds(base.ExporterBase):
     point_time: point_cloud_io.PointTime = "sweep_middle"
 
     def check(self, info: DatasetInfo) -> None:
-        """Reject a data set without a laser scanner.
-
-        Raises:
-            ConfigError: there is none.
-        """
+        """Reject a data set without a laser scanner. Raises ConfigError if there is none."""
         if not info.lidars:
             raise errors.ConfigError(
                 "exporter 'pointclouds': there is no lidar; add a sensor of that type"
@@ -87,6 +83,7 @@ class PointClouds(base.ExporterBase):
         """Write one file per sweep, and a line with its pose."""
         self.check(info)
         encoded = {"ply": ply_bytes, "pcd": pcd_bytes}[self.format]
+        meaning = {**self.conventions.facts(), "point_time": self.point_time}
         kept = list(samples)
         for lidar in info.lidars:
             folder = shard_dir / self.type / lidar
@@ -99,13 +96,9 @@ class PointClouds(base.ExporterBase):
                     point_cloud_io.count_times_from(self.point_time, stored, sweep_s)
                 )
                 path = folder / f"{sample.index:09d}.{self.format}"
-                path.write_bytes(encoded(points, self._statements()))
+                path.write_bytes(encoded(points, meaning))
             lines = "".join(canonical_json(self._pose(sample, lidar)) + "\n" for sample in mine)
             (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
-
-    def _statements(self) -> dict[str, str]:
-        """Meaning of the numbers in a file."""
-        return {**self.conventions.facts(), "point_time": self.point_time}
 
     def _pose(self, sample: Sample, lidar: str) -> dict[str, Any]:
         scanner = point_cloud_io.scanner_at_sweep(sample, lidar)

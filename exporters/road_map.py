@@ -56,11 +56,7 @@ class StreetExporter(base.AssetExporter):
     type: str
 
     def check(self, info: DatasetInfo) -> None:
-        """Reject a system without Shapely.
-
-        Raises:
-            ConfigError: Shapely is missing.
-        """
+        """Reject a system without Shapely. Raises ConfigError if Shapely is missing."""
         del info
         base.check_installed(self.type, "shapely")
 

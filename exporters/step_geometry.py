@@ -54,7 +54,7 @@ TABLES: Mapping[str, Mapping[str, Array]] = {
         "annotation.contact": Array("float32", (-1, 4), ("force_n", "x_m", "y_m", "z_m")),
     },
     "relations": {
-        "annotation.relation": Array("int64", (-1, 3), ("subject", "predicate", "object")),
+        "annotation.relation": Array("int64", (-1, 3), ("subject", "predicate", "object"))
     },
 }
 """Arrays with a row per object, contact or relation; predicates count from 0 in ``PREDICATES``."""
@@ -62,11 +62,7 @@ _CAMERA = {"K": (3, 3), "T_world_camera": (4, 4)}
 
 
 def check(info: DatasetInfo, parts: Sequence[Part], cameras: Sequence[str], exporter: str) -> None:
-    """Reject parts that the cameras do not see.
-
-    Raises:
-        ConfigError: a camera lacks a channel.
-    """
+    """Reject parts that the cameras do not see. Raises ConfigError if a camera lacks a channel."""
     for part, channel in IMAGES.items():
         remedy = f", or leave '{part}' out of the exporter's geometry"
         for camera in cameras if part in parts else ():

@@ -217,11 +217,7 @@ def _indices_png(numbers: UInt16, indices: Sequence[int]) -> bytes:
 
 
 def encode_jpeg(source: Path) -> bytes:
-    """Encode a PNG file as JPEG.
-
-    Raises:
-        StorageError: the file is missing or no PNG.
-    """
+    """Encode a PNG file as JPEG. Raises StorageError if the file is missing or no PNG."""
     image = read_pixels(source, is_bgr=True)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return data.tobytes()

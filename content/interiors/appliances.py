@@ -85,17 +85,15 @@ def toaster(rng: VariantRng) -> Solid:
 def kettle(rng: VariantRng) -> Solid:
     """An electric kettle on its base. Slots: case, dark."""
     r, h = rng.between(0.07, 0.085, "radius_m"), rng.between(0.18, 0.23, "height_m")
-    body = shapes.lathe(
-        [
-            (0.0, 0.02),
-            (r, 0.02),
-            (r * 1.03, 0.08),
-            (0.75 * r, h),
-            (0.6 * r, h + 0.015),
-            (0.0, h + 0.02),
-        ],
-        36,
-    )
+    profile = [
+        (0.0, 0.02),
+        (r, 0.02),
+        (r * 1.03, 0.08),
+        (0.75 * r, h),
+        (0.6 * r, h + 0.015),
+        (0.0, h + 0.02),
+    ]
+    body = shapes.lathe(profile, 36)
     grip = [(0.75 * r, 0.95 * h), (r + 0.05, 0.9 * h), (r + 0.055, 0.5 * h), (r, 0.25 * h)]
     patches = [
         disc(0, 0, 0.0, 0.02, 1.05 * r, 1, 36),
@@ -115,9 +113,8 @@ def coffee_maker(rng: VariantRng) -> Solid:
         ((-0.12, -0.5 * w, 0.04), (-0.02, 0.5 * w, h)),
         ((-0.02, -0.5 * w, h - 0.1), (0.12, 0.5 * w, h)),
     ]
-    jug = shapes.lathe(
-        [(0.0, 0.042), (0.055, 0.042), (0.062, 0.1), (0.045, h - 0.12), (0.0, h - 0.11)], 30, 1
-    )
+    profile = [(0.0, 0.042), (0.055, 0.042), (0.062, 0.1), (0.045, h - 0.12), (0.0, h - 0.11)]
+    jug = shapes.lathe(profile, 30, 1)
     patches = [*(shapes.block(*b, 0.008) for b in boxes), jug.moved(0.05)]
     patches.append(rod((0.11, 0.0, 0.08), (0.11, 0.0, h - 0.13), 0.008, 0))
     return solid(patches, [_case(rng), Material((0.03, 0.02, 0.015), 0.08)], boxes)
@@ -126,15 +123,11 @@ def coffee_maker(rng: VariantRng) -> Solid:
 def cooking_pot(rng: VariantRng) -> Solid:
     """A pot, some with a lid. Slots: body, handles."""
     r, h = rng.between(0.08, 0.13, "radius_m"), rng.between(0.09, 0.16, "height_m")
-    patches = [
-        shapes.lathe(
-            [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.003, h), (r - 0.003, 0.004), (0.0, 0.004)], 40
-        )
-    ]
+    profile = [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.003, h), (r - 0.003, 0.004), (0.0, 0.004)]
+    patches = [shapes.lathe(profile, 40)]
     if rng.chance(0.6):
-        patches.append(
-            shapes.lathe([(r + 0.004, h), (r, h + 0.01), (0.0, h + 0.022), (0.0, h)], 40)
-        )
+        lid = [(r + 0.004, h), (r, h + 0.01), (0.0, h + 0.022), (0.0, h)]
+        patches.append(shapes.lathe(lid, 40))
         patches.append(disc(0, 0, h + 0.02, h + 0.045, 0.018, 1))
     for s in (-1, 1):
         a, b = s * r, s * (r + 0.035)
@@ -227,9 +220,8 @@ def router(rng: VariantRng) -> Solid:
     patches = [cushion(*body, 0, 0.012)]
     for y in (-0.08, 0.08):
         patches.append(rod((-0.06, y, 0.02), (-0.065, y, rng.between(0.12, 0.19)), 0.006, 1))
-    return solid(
-        patches, [painted_material(rng.choose(("#f1f0ec", "#1d1e20")), 0.4), _DARK], [body]
-    )
+    looks = [painted_material(rng.choose(("#f1f0ec", "#1d1e20")), 0.4), _DARK]
+    return solid(patches, looks, [body])
 
 
 def game_console(rng: VariantRng) -> Solid:
@@ -239,9 +231,8 @@ def game_console(rng: VariantRng) -> Solid:
         shapes.block(*body, 0.012),
         shapes.block((0.128, -0.13, 0.02), (0.132, 0.1, 0.024), 0.0, 1),
     ]
-    return solid(
-        patches, [painted_material(rng.choose(("#f3f3f3", "#161718")), 0.3), _STEEL], [body]
-    )
+    looks = [painted_material(rng.choose(("#f3f3f3", "#161718")), 0.3), _STEEL]
+    return solid(patches, looks, [body])
 
 
 def basket(rng: VariantRng) -> Solid:
@@ -318,9 +309,8 @@ def ladder(rng: VariantRng) -> Solid:
             shapes.block((x - 0.05, -y, t * h - 0.012), (x + 0.03, y, t * h + 0.012), 0.003, 0)
         )
     patches.append(shapes.block((-0.08, -0.8 * w, h - 0.01), (0.1, 0.8 * w, h + 0.015), 0.006, 1))
-    return solid(
-        patches, [metal_material((0.8, 0.8, 0.8), 0.35), _DARK], [((-0.34, -w, 0.0), (0.3, w, h))]
-    )
+    looks = [metal_material((0.8, 0.8, 0.8), 0.35), _DARK]
+    return solid(patches, looks, [((-0.34, -w, 0.0), (0.3, w, h))])
 
 
 def bucket(rng: VariantRng) -> Solid:
@@ -341,19 +331,15 @@ def bucket(rng: VariantRng) -> Solid:
         start = (-r * math.sin(a), r * math.cos(a), h - 0.02)
         end = (-r * math.sin(b), r * math.cos(b), h - 0.02)
         patches.append(rod(start, end, 0.003, 1, 6))
-    return solid(
-        patches,
-        [Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4), metal_material(STEEL, 0.4)],
-        [((-0.75 * r, -0.75 * r, 0.0), (0.75 * r, 0.75 * r, h))],
-    )
+    looks = [Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4), metal_material(STEEL, 0.4)]
+    return solid(patches, looks, [((-0.75 * r, -0.75 * r, 0.0), (0.75 * r, 0.75 * r, h))])
 
 
 def fire_extinguisher(rng: VariantRng) -> Solid:
     """A fire extinguisher. Slots: red, dark."""
     r, h = rng.between(0.07, 0.09, "radius_m"), rng.between(0.4, 0.52, "height_m")
-    body = shapes.lathe(
-        [(0.0, 0.0), (r, 0.0), (r, h - 0.06), (0.6 * r, h - 0.02), (0.02, h), (0.0, h)], 32
-    )
+    profile = [(0.0, 0.0), (r, 0.0), (r, h - 0.06), (0.6 * r, h - 0.02), (0.02, h), (0.0, h)]
+    body = shapes.lathe(profile, 32)
     patches = [body, disc(0, 0, h - 0.01, h + 0.04, 0.018, 1)]
     patches += [
         rod((0.0, 0.0, h + 0.035), (0.1, 0.0, h + 0.06), 0.008, 1),
@@ -379,11 +365,8 @@ def toilet_paper(rng: VariantRng) -> Solid:
     """A roll of toilet paper. Slots: paper, core."""
     r = rng.between(0.04, 0.058, "radius_m")
     ring = [(0.02, 0.0), (r, 0.0), (r, 0.1), (0.02, 0.1), (0.02, 0.0)]
-    return solid(
-        [shapes.lathe(ring, 36)],
-        [painted_material("#f4f2ec", 1.0)],
-        [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, 0.1))],
-    )
+    boxes = [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, 0.1))]
+    return solid([shapes.lathe(ring, 36)], [painted_material("#f4f2ec", 1.0)], boxes)
 
 
 def tissue_box(rng: VariantRng) -> Solid:
@@ -391,11 +374,8 @@ def tissue_box(rng: VariantRng) -> Solid:
     body: Box = ((-0.06, -0.11, 0.0), (0.06, 0.11, rng.between(0.06, 0.1, "height_m")))
     h = body[1][2]
     sheet = cushion((-0.015, -0.05, h - 0.01), (0.015, 0.05, h + 0.06), 1, 0.014)
-    return solid(
-        [shapes.block(*body, 0.002), sheet],
-        [painted_material(rng.choose(HOUSEHOLD[:11]), 0.6), painted_material("#f7f6f2", 1.0)],
-        [body],
-    )
+    looks = [painted_material(rng.choose(HOUSEHOLD[:11]), 0.6), painted_material("#f7f6f2", 1.0)]
+    return solid([shapes.block(*body, 0.002), sheet], looks, [body])
 
 
 def alarm_clock(rng: VariantRng) -> Solid:
@@ -404,9 +384,8 @@ def alarm_clock(rng: VariantRng) -> Solid:
     body: Box = ((-0.03, -w, 0.0), (0.03, w, h))
     face = shapes.block((0.03, -0.85 * w, 0.12 * h), (0.031, 0.85 * w, 0.88 * h), 0.0, 1)
     lit = Material((0.01, 0.01, 0.01), 0.1) if rng.chance(0.6) else painted_material("#f2f0ea", 0.5)
-    return solid(
-        [cushion(*body, 0, 0.015), face], [painted_material(rng.choose(LACQUERS), 0.4), lit], [body]
-    )
+    patches = [cushion(*body, 0, 0.015), face]
+    return solid(patches, [painted_material(rng.choose(LACQUERS), 0.4), lit], [body])
 
 
 def shoes(rng: VariantRng) -> Solid:
@@ -420,8 +399,5 @@ def shoes(rng: VariantRng) -> Solid:
         draw_linear(("#2a1d17", "#1c1b1b", "#f0efeb", "#39434d", "#8c2f39", "#8a5a34"), 0.1, rng),
         0.6,
     )
-    return solid(
-        patches,
-        [upper, painted_material(rng.choose(("#e9e7e1", "#1b1b1c")), 0.8)],
-        [((-0.13, -0.105, 0.0), (0.14, 0.105, 0.09))],
-    )
+    looks = [upper, painted_material(rng.choose(("#e9e7e1", "#1b1b1c")), 0.8)]
+    return solid(patches, looks, [((-0.13, -0.105, 0.0), (0.14, 0.105, 0.09))])

@@ -34,12 +34,10 @@ def tape_carton(
             (x0 - t, middle - 0.025, z1 - 0.002), (x1 + t, middle + 0.025, z1 + t), 0.0, tape
         )
     )
-    for x in (x0, x1):
-        patches.append(
-            shapes.block(
-                (x - t, middle - 0.025, z1 - 0.06), (x + t, middle + 0.025, z1 + t), 0.0, tape
-            )
-        )
+    patches += [
+        shapes.block((x - t, middle - 0.025, z1 - 0.06), (x + t, middle + 0.025, z1 + t), 0.0, tape)
+        for x in (x0, x1)
+    ]
     # The joint of the flaps, and labels and marks on all four sides.
     for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1)):
         a0, a1 = (y0, y1) if axis == 0 else (x0, x1)

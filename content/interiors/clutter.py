@@ -122,9 +122,8 @@ def binder_row(rng: VariantRng) -> Solid:
 def pen_cup(rng: VariantRng) -> Solid:
     """A cup with pens. Slots: cup, pens."""
     r, h = rng.between(0.034, 0.042, "radius_m"), rng.between(0.09, 0.11, "height_m")
-    cup = shapes.lathe(
-        [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.003, h), (r - 0.003, 0.004), (0.0, 0.004)], 28
-    )
+    profile = [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.003, h), (r - 0.003, 0.004), (0.0, 0.004)]
+    cup = shapes.lathe(profile, 28)
     patches = [cup]
     for k in range(int(rng.between(4, 10))):
         a = rng.between(0.0, 2.0 * math.pi)
@@ -220,9 +219,8 @@ def plate_stack(rng: VariantRng) -> Solid:
     ]
     top = rise + (count - 1) * step
     glaze = Material(draw_linear(GLAZES, 0.08, rng), 0.15)
-    return solid(
-        patches, [glaze], [((-0.7 * radius, -0.7 * radius, 0.0), (0.7 * radius, 0.7 * radius, top))]
-    )
+    boxes = [((-0.7 * radius, -0.7 * radius, 0.0), (0.7 * radius, 0.7 * radius, top))]
+    return solid(patches, [glaze], boxes)
 
 
 def fruit_bowl(rng: VariantRng) -> Solid:
@@ -261,9 +259,8 @@ def knife_block(rng: VariantRng) -> Solid:
 def utensil_pot(rng: VariantRng) -> Solid:
     """A pot with wooden spoons and ladles. Slots: pot, wood, steel."""
     r, h = rng.between(0.05, 0.065, "radius_m"), rng.between(0.13, 0.17, "height_m")
-    pot = shapes.lathe(
-        [(0.0, 0.0), (0.9 * r, 0.0), (r, h), (r - 0.005, h), (0.86 * r, 0.006), (0.0, 0.006)], 30
-    )
+    profile = [(0.0, 0.0), (0.9 * r, 0.0), (r, h), (r - 0.005, h), (0.86 * r, 0.006), (0.0, 0.006)]
+    pot = shapes.lathe(profile, 30)
     patches = [pot]
     for _ in range(int(rng.between(3, 8))):
         a, top = rng.between(0.0, 2.0 * math.pi), h + rng.between(0.1, 0.18)
@@ -305,9 +302,8 @@ def spice_rack(rng: VariantRng) -> Solid:
         Material(draw_linear((c,), 0.15, rng), 0.3) for c in ("#7a3b16", "#7d8a3a", "#c79a2e")
     ]
     box: Box = ((-0.06, -0.5 * w, 0.0), (0.06, 0.5 * w, 0.26))
-    return solid(
-        patches, [front(rng), rng.choose((_DARK, metal_material(STAINLESS, 0.3))), *spices], [box]
-    )
+    looks = [front(rng), rng.choose((_DARK, metal_material(STAINLESS, 0.3))), *spices]
+    return solid(patches, looks, [box])
 
 
 def paper_towel(rng: VariantRng) -> Solid:
@@ -316,19 +312,15 @@ def paper_towel(rng: VariantRng) -> Solid:
     roll = shapes.lathe([(0.02, 0.015), (r, 0.015), (r, 0.24), (0.02, 0.24), (0.02, 0.015)], 32, 1)
     patches = [disc(0, 0, 0.0, 0.014, 0.075, 0, 32), rod((0, 0, 0.01), (0, 0, 0.3), 0.008, 0), roll]
     stand = wood(rng) if rng.chance(0.5) else metal_material(STAINLESS, 0.25)
-    return solid(
-        patches,
-        [stand, painted_material("#f6f5f1", 0.95)],
-        [((-0.055, -0.055, 0.0), (0.055, 0.055, 0.26))],
-    )
+    looks = [stand, painted_material("#f6f5f1", 0.95)]
+    return solid(patches, looks, [((-0.055, -0.055, 0.0), (0.055, 0.055, 0.26))])
 
 
 def toothbrush_cup(rng: VariantRng) -> Solid:
     """A cup with toothbrushes. Slots: cup, brushes."""
     r, h = 0.036, rng.between(0.09, 0.11, "height_m")
-    cup = shapes.lathe(
-        [(0.0, 0.0), (r, 0.0), (1.05 * r, h), (r, h), (0.92 * r, 0.005), (0.0, 0.005)], 28
-    )
+    profile = [(0.0, 0.0), (r, 0.0), (1.05 * r, h), (r, h), (0.92 * r, 0.005), (0.0, 0.005)]
+    cup = shapes.lathe(profile, 28)
     patches = [cup]
     for k in range(rng.turn((1, 2, 3), "count")):
         a = 2.1 * k + rng.between(0.0, 1.0)
@@ -361,9 +353,8 @@ def shampoo(rng: VariantRng) -> Solid:
         _plastic(rng),
         printed_material(f"texture/book_cover?seed={rng.seed + 5}", 0.35),
     ]
-    return solid(
-        [body, flat, cap, shapes.block(*label, 0.0, 2)], looks, [((-x, -y, 0.0), (x, y, h))]
-    )
+    patches = [body, flat, cap, shapes.block(*label, 0.0, 2)]
+    return solid(patches, looks, [((-x, -y, 0.0), (x, y, h))])
 
 
 def toilet_brush(rng: VariantRng) -> Solid:
@@ -383,9 +374,8 @@ def bathroom_scale(rng: VariantRng) -> Solid:
     body: Box = ((-0.15, -0.15, 0.0), (0.15, 0.15, 0.028))
     display: Box = ((0.08, -0.045, 0.0275), (0.12, 0.045, 0.0288))
     paint = painted_material(rng.choose(("#f2f2f0", "#1d1e20", "#b9c2bd")), 0.15)
-    return solid(
-        [shapes.block(*body, 0.01), shapes.block(*display, 0.0, 1)], [paint, _DARK], [body]
-    )
+    patches = [shapes.block(*body, 0.01), shapes.block(*display, 0.0, 1)]
+    return solid(patches, [paint, _DARK], [body])
 
 
 def power_strip(rng: VariantRng) -> Solid:
@@ -528,16 +518,12 @@ def dumbbells(rng: VariantRng) -> Solid:
     patches: list[Patch] = []
     for x in (-1.2 * r, 1.2 * r):
         patches.append(rod((x, -0.075, r), (x, 0.075, r), 0.014, 1, 12))
-        for sy in (-1, 1):
-            patches.append(rod((x, sy * 0.06, r), (x, sy * 0.13, r), r, 0, 6))
+        patches += [rod((x, sy * 0.06, r), (x, sy * 0.13, r), r, 0, 6) for sy in (-1, 1)]
     head = painted_material(rng.choose(("#1d1e20", "#7a2f5a", "#2f5d7c")), 0.5)
     lowest = min(float(p.corners_m[..., 2].min()) for p in patches)
     moved = [p.moved(0.0, 0.0, -lowest) for p in patches]
-    return solid(
-        moved,
-        [head, metal_material(STEEL, 0.3)],
-        [((-2.2 * r, -0.13, 0.0), (2.2 * r, 0.13, 2 * r))],
-    )
+    looks = [head, metal_material(STEEL, 0.3)]
+    return solid(moved, looks, [((-2.2 * r, -0.13, 0.0), (2.2 * r, 0.13, 2 * r))])
 
 
 def step_stool(rng: VariantRng) -> Solid:
@@ -549,9 +535,8 @@ def step_stool(rng: VariantRng) -> Solid:
         ((-0.22, sy * y - 0.01, 0.0), (0.2, sy * y + 0.01, 0.2)) for sy in (-0.94, 0.94)
     ] + [((-0.22, sy * y - 0.01, 0.2), (0.0, sy * y + 0.01, 0.4)) for sy in (-0.94, 0.94)]
     look = front(rng)
-    return solid(
-        [board(*b) for b in steps] + [board(*b, 1) for b in sides], [look, look], [*steps, *sides]
-    )
+    boxes = [*steps, *sides]
+    return solid([board(*b) for b in steps] + [board(*b, 1) for b in sides], [look, look], boxes)
 
 
 def drill(rng: VariantRng) -> Solid:

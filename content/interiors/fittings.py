@@ -175,11 +175,8 @@ def curtain(rng: VariantRng) -> Solid:
         patches.append(ring.rotated("x", 0.5 * math.pi).moved(0.0, at, h + 0.011))
     light = cloth(rng)
     made = replace(light, diffuse_transmission=_scaled(light.base_color, 0.3))
-    return solid(
-        patches,
-        [made, metal_material(STAINLESS, 0.35)],
-        [((-0.03, -0.5 * w, 0.0), (0.03, 0.5 * w, h))],
-    )
+    looks = [made, metal_material(STAINLESS, 0.35)]
+    return solid(patches, looks, [((-0.03, -0.5 * w, 0.0), (0.03, 0.5 * w, h))])
 
 
 def rug(rng: VariantRng) -> Solid:
@@ -191,11 +188,8 @@ def rug(rng: VariantRng) -> Solid:
     t = 0.012
     if rng.seed % 4 == 3:
         r = rng.between(0.6, 1.0, "radius_m")
-        return solid(
-            [disc(0, 0, 0, t, r, 0, 56)],
-            [pile, edge],
-            [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, t))],
-        )
+        patches = [disc(0, 0, 0, t, r, 0, 56)]
+        return solid(patches, [pile, edge], [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, t))])
     x = 0.5 * rng.between(1.2, 2.0, "depth_m")
     y = 0.5 * rng.between(1.8, 3.0, "width_m")
     b = rng.between(0.04, 0.14)
@@ -259,9 +253,8 @@ def mirror(rng: VariantRng) -> Solid:
     ).painted(1)
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.01, 0.5 * w - 0.004, h - 0.004))
     silver = Material((0.93, 0.94, 0.93), 0.02, metallic=1.0, role="mirror")
-    return solid(
-        [*_frame(w, h, f, 0.025), shapes.block(*back), glass], [front(rng), silver], [back]
-    )
+    patches = [*_frame(w, h, f, 0.025), shapes.block(*back), glass]
+    return solid(patches, [front(rng), silver], [back])
 
 
 def _frame(
@@ -301,11 +294,8 @@ def radiator(rng: VariantRng) -> Solid:
         shapes.block((0.0, -0.3 * w, 0.1), (0.03, -0.3 * w + 0.03, h - 0.1), 0.0),
         shapes.block((0.0, 0.3 * w, 0.1), (0.03, 0.3 * w + 0.03, h - 0.1), 0.0),
     ]
-    return solid(
-        patches,
-        [painted_material("#f1f0ec", 0.35), painted_material("#e5e3dd", 0.4)],
-        [((0.0, -0.5 * w, 0.0), (0.1, 0.5 * w, h))],
-    )
+    looks = [painted_material("#f1f0ec", 0.35), painted_material("#e5e3dd", 0.4)]
+    return solid(patches, looks, [((0.0, -0.5 * w, 0.0), (0.1, 0.5 * w, h))])
 
 
 def screen(family: str, seed: int, measures: Measures) -> Solid:
@@ -325,18 +315,16 @@ def screen(family: str, seed: int, measures: Measures) -> Solid:
         ]
     else:
         for sy in (-1, 1):
-            patches.append(
+            patches += [
                 shapes.block(
                     (-0.1, sy * 0.36 * w - 0.012, 0.0), (0.1, sy * 0.36 * w + 0.012, 0.01), 0.003
-                )
-            )
-            patches.append(
+                ),
                 shapes.block(
                     (-0.01, sy * 0.36 * w - 0.01, 0.01),
                     (0.005, sy * 0.36 * w + 0.01, lift_m + 0.01),
                     0.002,
-                )
-            )
+                ),
+            ]
     drop = np.array(
         [
             (-0.022, 0.12 * w, lift_m + 0.35 * h),
@@ -383,11 +371,8 @@ def laptop_lid(seed: int = 0) -> Solid:
         (d - 0.012, -0.5 * w + 0.01, 0.0015), (0.0, w - 0.02, 0.0), (-d + 0.03, 0.0, 0.0)
     )
     screen = screen.flipped().painted(1)
-    return solid(
-        [shapes.block(*lid, 0.003), screen],
-        [_housing(rng), Material((0.01, 0.01, 0.011), 0.15, role="screen")],
-        [lid],
-    )
+    looks = [_housing(rng), Material((0.01, 0.01, 0.011), 0.15, role="screen")]
+    return solid([shapes.block(*lid, 0.003), screen], looks, [lid])
 
 
 def _laptop(seed: int) -> tuple[VariantRng, float, float]:
@@ -432,11 +417,8 @@ def house_plant(rng: VariantRng) -> Solid:
         draw_linear(("#b5643c", "#f0ede6", "#3a3d40", "#8a9a8d", "#d8c7ab"), 0.1, rng), 0.6
     )
     top = h + 0.6 * length
-    return solid(
-        patches,
-        [clay, Material((0.05, 0.035, 0.025), 1.0), leaf],
-        [((-r, -r, 0.0), (r, r, h)), ((-0.6 * r, -0.6 * r, h), (0.6 * r, 0.6 * r, top))],
-    )
+    boxes = [((-r, -r, 0.0), (r, r, h)), ((-0.6 * r, -0.6 * r, h), (0.6 * r, 0.6 * r, top))]
+    return solid(patches, [clay, Material((0.05, 0.035, 0.025), 1.0), leaf], boxes)
 
 
 def _leaf(rng: VariantRng, length: float) -> Patch:
@@ -462,19 +444,17 @@ def _leaf(rng: VariantRng, length: float) -> Patch:
 def waste_basket(rng: VariantRng) -> Solid:
     """A waste basket. Slot: body."""
     r, h = rng.between(0.12, 0.17, "radius_m"), rng.between(0.26, 0.36, "height_m")
-    body = shapes.lathe(
-        [
-            (0.0, 0.0),
-            (0.8 * r, 0.0),
-            (r, h),
-            (r + 0.006, h),
-            (r + 0.006, h + 0.008),
-            (r - 0.004, h + 0.008),
-            (0.8 * r - 0.004, 0.006),
-            (0.0, 0.006),
-        ],
-        36,
-    )
+    profile = [
+        (0.0, 0.0),
+        (0.8 * r, 0.0),
+        (r, h),
+        (r + 0.006, h),
+        (r + 0.006, h + 0.008),
+        (r - 0.004, h + 0.008),
+        (0.8 * r - 0.004, 0.006),
+        (0.0, 0.006),
+    ]
+    body = shapes.lathe(profile, 36)
     paint = (
         Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4)
         if rng.chance(0.5)

@@ -58,11 +58,8 @@ def kitchen_sink(rng: VariantRng) -> Solid:
         board((_X, -0.297, 0.103), (_X + 0.018, 0.297, 0.857), 1),
         *handle(_X + 0.018, 0.0, 0.78, 0.2, 2, upright=False),
     ]
-    made = solid(
-        patches,
-        _looks("kitchen_unit", rng, rng.seed),
-        [((-_X, -0.3, 0.0), (_X, 0.3, 0.72)), *_worktop(hole=True)],
-    )
+    boxes = [((-_X, -0.3, 0.0), (_X, 0.3, 0.72)), *_worktop(hole=True)]
+    made = solid(patches, _looks("kitchen_unit", rng, rng.seed), boxes)
     return _with_water(made, (-0.22, 0.0, 0.9), height, 0.726)
 
 
@@ -233,16 +230,14 @@ def toilet(rng: VariantRng) -> Solid:
         (0.0, z - 0.2),
     ]
     bowl = shapes.lathe([(0.0, 0.0), *outline], 36).scaled(1.35, 1.0, 1.0).moved(0.1)
-    seat = shapes.lathe(
-        [(0.12, z), (0.19, z), (0.19, z + 0.018), (0.12, z + 0.018), (0.12, z)], 36, 1
-    )
+    profile = [(0.12, z), (0.19, z), (0.19, z + 0.018), (0.12, z + 0.018), (0.12, z)]
+    seat = shapes.lathe(profile, 36, 1)
     patches: list[Patch] = [bowl, seat.scaled(1.35, 1.0, 1.0).moved(0.1)]
     x = -0.35
     patches.append(shapes.block((x, -0.1, 0.08), (0.0, 0.1, z - 0.06), 0.03))
     closed = rng.chance(0.5, "closed")
-    lid = shapes.lathe([(0.0, 0.0), (0.19, 0.0), (0.19, 0.014), (0.0, 0.02)], 36, 1).scaled(
-        1.35, 1.0, 1.0
-    )
+    oval = [(0.0, 0.0), (0.19, 0.0), (0.19, 0.014), (0.0, 0.02)]
+    lid = shapes.lathe(oval, 36, 1).scaled(1.35, 1.0, 1.0)
     if closed:
         patches.append(lid.moved(0.1, 0.0, z + 0.018))
     else:
@@ -331,12 +326,10 @@ def shower(rng: VariantRng) -> Solid:
         ((x - 0.008, 0.0, 0.06), (x, x - 0.008, 1.95)),
     ]
     patches += [shapes.block(*b, 0.0, 2) for b in sides]
-    for b in sides:
-        patches.append(
-            shapes.block(
-                (b[0][0], b[0][1] - 0.004, 1.94), (b[1][0], b[1][1] + 0.004, 1.97), 0.002, 1
-            )
-        )
+    patches += [
+        shapes.block((b[0][0], b[0][1] - 0.004, 1.94), (b[1][0], b[1][1] + 0.004, 1.97), 0.002, 1)
+        for b in sides
+    ]
     patches += [
         rod((-x + 0.06, 0.0, 0.9), (-x + 0.06, 0.0, 2.05), 0.011, 1),
         rod((-x + 0.06, 0.0, 2.05), (-x + 0.34, 0.0, 2.05), 0.011, 1),

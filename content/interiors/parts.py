@@ -33,14 +33,7 @@ HOUSEHOLD = (
 )  # fmt: skip
 """Plastics in homes and offices, sRGB: most are pale, grey or dull."""
 TOOLS = (
-    "#2b2d30",
-    "#3b4046",
-    "#c9a227",
-    "#a3261d",
-    "#1f4e79",
-    "#2f6f4f",
-    "#d9641e",
-    "#8d9093",
+    *("#2b2d30", "#3b4046", "#c9a227", "#a3261d", "#1f4e79", "#2f6f4f", "#d9641e", "#8d9093"),
     "#d9d6cf",
 )
 """Plastics and paints of tools and containers, sRGB."""

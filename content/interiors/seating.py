@@ -216,9 +216,8 @@ def stool(rng: VariantRng) -> Solid:
         patches.append(
             rod((0.7 * r * c, 0.7 * r * s, z - 0.03), (1.05 * r * c, 1.05 * r * s, 0.0), 0.014, 1)
         )
-    return solid(
-        patches, [front(rng), wood(rng)], [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, z))]
-    )
+    looks = [front(rng), wood(rng)]
+    return solid(patches, looks, [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, z))])
 
 
 def office_chair(rng: VariantRng) -> Solid:
@@ -384,23 +383,17 @@ def _cables(rng: VariantRng, x: float, w: float, z: float) -> list[Patch]:
 
 def _round_table(rng: VariantRng, radius_m: float, height_m: float) -> Solid:
     r, z = radius_m, height_m
-    patches = [
-        disc(0.0, 0.0, z - 0.025, z, r, 0, 40),
-        shapes.lathe(
-            [
-                (0.0, 0.0),
-                (0.6 * r, 0.0),
-                (0.6 * r, 0.012),
-                (0.05, 0.04),
-                (0.03, 0.1),
-                (0.03, z - 0.05),
-                (0.1, z - 0.025),
-                (0.0, z - 0.025),
-            ],
-            28,
-            1,
-        ),
+    profile = [
+        (0.0, 0.0),
+        (0.6 * r, 0.0),
+        (0.6 * r, 0.012),
+        (0.05, 0.04),
+        (0.03, 0.1),
+        (0.03, z - 0.05),
+        (0.1, z - 0.025),
+        (0.0, z - 0.025),
     ]
+    patches = [disc(0.0, 0.0, z - 0.025, z, r, 0, 40), shapes.lathe(profile, 28, 1)]
     legs = painted_material("#26282b", 0.4) if rng.chance(0.6) else wood(rng)
     q = 0.7071 * r
     boxes: list[Box] = [

@@ -36,11 +36,7 @@ SILL_REACH_M, SILL_BESIDE_M = 0.05, 0.04
 
 
 def floor(size_m: tuple[float, float] = (4.0, 4.0)) -> Solid:
-    """A floor, its upper side at z = 0. Slot: floor.
-
-    Raises:
-        AssetError: if a size is not usable.
-    """
+    """A floor, its upper side at z = 0. Slot: floor. Raises AssetError if a size is not usable."""
     x, y, _ = check_size("floor", (*size_m, 1.0), 0.2)
     face = rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0))
     slab = (-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)
@@ -57,9 +53,8 @@ def ceiling(size_m: tuple[float, float] = (4.0, 4.0)) -> Solid:
     face = rectangle((-x / 2, y / 2, 0.0), (x, 0.0, 0.0), (0.0, -y, 0.0))
     # A second side keeps the sun out for renderers that cull back faces.
     slab = (-x / 2, -y / 2, 0.0), (x / 2, y / 2, 0.2)
-    return solid(
-        [face, shapes.block(*slab).moved(z=0.001)], [painted_material("#f4f3ef", 0.9)], [slab]
-    )
+    patches = [face, shapes.block(*slab).moved(z=0.001)]
+    return solid(patches, [painted_material("#f4f3ef", 0.9)], [slab])
 
 
 def wall(
@@ -176,9 +171,8 @@ def door_leaf(size_m: tuple[float, float] = (0.84, 2.02), style: int = 0) -> Sol
         ]
     paint = painted_material(("#f2f0eb", "#e9e4d9", "#f2f0eb", "#dfe3e4")[style % 4], 0.4)
     pane = Material((0.75, 0.8, 0.8), 0.5)
-    return solid(
-        patches, [paint, metal_material(STAINLESS, 0.3), pane], [((-t, 0.0, z0), (t, w, h))]
-    )
+    looks = [paint, metal_material(STAINLESS, 0.3), pane]
+    return solid(patches, looks, [((-t, 0.0, z0), (t, w, h))])
 
 
 def _raised_panel(ys: tuple[float, float], zs: tuple[float, float]) -> Patch:

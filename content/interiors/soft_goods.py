@@ -216,8 +216,7 @@ def bed(rng: VariantRng) -> Solid:
     patches: list[Patch] = [
         parts.cushion(*head, 4, 0.03) if soft_head else parts.board(*head, 0, 0.006)
     ]
-    patches += [parts.board(*b) for b in sides]
-    patches += parts.four_legs(x1 - x0, y1 - y0, 0.2, 0.06, 0)
+    patches += [*(parts.board(*b) for b in sides), *parts.four_legs(x1 - x0, y1 - y0, 0.2, 0.06, 0)]
     mattress: parts.Box = ((-0.5 * length, -0.5 * w, 0.14), (0.5 * length, 0.5 * w, top))
     patches.append(parts.cushion(*mattress, 1, 0.05))
     fold, hang = rng.between(0.5, 0.75, "fold_m"), rng.between(0.16, 0.26, "hang_m")
@@ -311,17 +310,15 @@ def clothes_pile(rng: VariantRng) -> Solid:
         patches.append(shapes.grid(points, slot=k).flipped().moved(dx, dy, 0.012 * k))
         reach, top = max(reach, 1.3 * r), max(top, float(z.max()) + 0.012 * k)
     looks = [fabric(rng) for _ in range(3)]
-    return parts.solid(
-        patches, looks, [((-0.5 * reach, -0.5 * reach, 0.0), (0.5 * reach, 0.5 * reach, top))]
-    )
+    boxes = [((-0.5 * reach, -0.5 * reach, 0.0), (0.5 * reach, 0.5 * reach, top))]
+    return parts.solid(patches, looks, boxes)
 
 
 def laundry_basket(rng: VariantRng) -> Solid:
     """A basket with clothes in it. Slots: basket, clothes."""
     r, h = rng.between(0.19, 0.24, "radius_m"), rng.between(0.38, 0.55, "height_m")
-    wall = shapes.lathe(
-        [(0.0, 0.0), (0.85 * r, 0.0), (r, h), (r - 0.012, h), (0.84 * r, 0.02), (0.0, 0.02)], 28
-    )
+    profile = [(0.0, 0.0), (0.85 * r, 0.0), (r, h), (r - 0.012, h), (0.84 * r, 0.02), (0.0, 0.02)]
+    wall = shapes.lathe(profile, 28)
     ring = np.linspace(0.0, 1.0, 20)[:, None]
     turn = np.linspace(0.0, 2.0 * math.pi, 61)[None, :]
     x, y = 0.96 * r * ring * np.cos(turn), 0.96 * r * ring * np.sin(turn)
@@ -575,9 +572,8 @@ def bath_mat(rng: VariantRng) -> Solid:
     pile = Material(draw_linear(PALETTES["cloth"], 0.1, rng), 1.0)
     look = patterned_material(f"texture/carpet?seed={int(rng.between(0, 16))}", 0.5, 1.0)
     body: parts.Box = ((-x, -y, 0.0), (x, y, t))
-    return parts.solid(
-        [parts.cushion(*body, 0, 0.007)], [look if rng.chance(0.4) else pile], [body]
-    )
+    patches = [parts.cushion(*body, 0, 0.007)]
+    return parts.solid(patches, [look if rng.chance(0.4) else pile], [body])
 
 
 def drying_rack(rng: VariantRng) -> Solid:

@@ -68,8 +68,7 @@ def _bowls(radius_m: float, count: int, slot: int) -> list[Patch]:
     r, made = radius_m, []
     outer = [(0.0, 0.0), (0.5 * r, 0.0), (0.85 * r, 0.3 * r), (r, 0.62 * r)]
     profile = [*outer, (0.96 * r, 0.62 * r), (0.8 * r, 0.32 * r), (0.45 * r, 0.03), (0.0, 0.03)]
-    for k in range(count):
-        made.append(shapes.lathe(profile, 28, slot).moved(0.0, 0.0, 0.02 * k))
+    made += [shapes.lathe(profile, 28, slot).moved(0.0, 0.0, 0.02 * k) for k in range(count)]
     return made
 
 
@@ -320,12 +319,11 @@ def pedal_bin(rng: VariantRng) -> Solid:
         (0.0, h),
     ]
     lid = shapes.lathe([(0.0, 0.9 * h), (1.02 * r, 0.9 * h), *dome], 40)
+    profile = [(0.0, 0.0), (0.97 * r, 0.0), (1.01 * r, 0.02), (r, 0.022), (0.0, 0.022)]
     patches = [
         body,
         lid,
-        shapes.lathe(
-            [(0.0, 0.0), (0.97 * r, 0.0), (1.01 * r, 0.02), (r, 0.022), (0.0, 0.022)], 40, 1
-        ),
+        shapes.lathe(profile, 40, 1),
         shapes.block((0.95 * r, -0.035, 0.008), (1.32 * r, 0.035, 0.018), 0.004, 1),
         shapes.block((-1.1 * r, -0.03, 0.86 * h), (-0.95 * r, 0.03, 0.93 * h), 0.004, 1),
     ]

@@ -108,8 +108,7 @@ def vacuum_cleaner(rng: VariantRng) -> Solid:
         patches.append(rod((-0.1, sy * 0.12, 0.09), (-0.1, sy * 0.15, 0.09), 0.09, 1, 28))
     path = [(0.17, 0.0, 0.15), (0.32, 0.06, 0.28), (0.38, 0.16, 0.18), (0.36, 0.22, 0.5)]
     path += [(0.34, 0.22, 0.95)]
-    for a, b in pairwise(path):
-        patches.append(rod(a, b, 0.02, 1, 14))
+    patches += [rod(a, b, 0.02, 1, 14) for a, b in pairwise(path)]
     patches.append(rod((0.34, 0.22, 0.05), (0.34, 0.22, 0.95), 0.016, 2, 14))
     patches.append(cushion((0.29, 0.08, 0.0), (0.39, 0.36, 0.05), 1, 0.02))
     boxes: list[Box] = [

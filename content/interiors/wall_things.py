@@ -130,10 +130,9 @@ def _hand_tool(y: float, top: float, length: float, kind: int) -> list[Patch]:
     x, low = 0.034, top - length
     if kind == 0:
         bar: Box = ((x - 0.004, y - 0.008, low + 0.015), (x + 0.004, y + 0.008, top - 0.01))
+        profile = [(0.0, -0.004), (0.018, -0.004), (0.018, 0.004), (0.0, 0.004)]
         ends = [
-            shapes.lathe([(0.0, -0.004), (0.018, -0.004), (0.018, 0.004), (0.0, 0.004)], 14, 1)
-            .rotated("y", 0.5 * math.pi)
-            .moved(x, y, z)
+            shapes.lathe(profile, 14, 1).rotated("y", 0.5 * math.pi).moved(x, y, z)
             for z in (low + 0.012, top - 0.012)
         ]
         return [shapes.block(*bar, 0.001, 1), *ends]
@@ -198,9 +197,8 @@ def roll_holder(rng: VariantRng) -> Solid:
         shapes.block((0.0, -0.09, 0.075), (0.006, -0.042, 0.125), 0.002, 0),
     ]
     box: Box = ((0.0, -0.07, 0.04), (0.13, 0.07, 0.16))
-    return solid(
-        patches, [metal_material(STAINLESS, 0.2), painted_material("#f6f5f2", 0.95)], [box]
-    )
+    looks = [metal_material(STAINLESS, 0.2), painted_material("#f6f5f2", 0.95)]
+    return solid(patches, looks, [box])
 
 
 def wall_calendar(rng: VariantRng) -> Solid:

@@ -180,9 +180,8 @@ def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
     t = min(0.02, 0.2 * z)
     plates = [((-x / 2, -y / 2, z0), (x / 2, y / 2, z0 + t)) for z0 in (0.0, z - t)]
     body = (-0.38 * x, -0.38 * y, t), (0.38 * x, 0.38 * y, z - t)
-    bolt = shapes.lathe(
-        [(0.0, 0.0), (0.009, 0.0), (0.009, 0.007), (0.007, 0.009), (0.0, 0.009)], 6, 1
-    )
+    profile = [(0.0, 0.0), (0.009, 0.0), (0.009, 0.007), (0.007, 0.009), (0.0, 0.009)]
+    bolt = shapes.lathe(profile, 6, 1)
     bolts = [bolt.moved(sx * 0.44 * x, sy * 0.44 * y, t) for sx, sy in _CORNERS]
     patches = [shapes.block(*body, 0.006), *(shapes.block(*p, 0.002, 1) for p in plates), *bolts]
     materials = (painted_material("#d7d9d8", 0.4), metal_material((0.45, 0.46, 0.48), 0.42))

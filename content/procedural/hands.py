@@ -129,10 +129,7 @@ def held_axis_m(seed: int, radii_m: Sequence[float]) -> Vec3:
 
 
 def hand_facts(
-    seed: int,
-    pose: str = "any",
-    radii_mm: Sequence[float] = (),
-    bends_deg: Sequence[float] = (),
+    seed: int, pose: str = "any", radii_mm: Sequence[float] = (), bends_deg: Sequence[float] = ()
 ) -> Facts:
     """Pose, side, and skin tone on the scale of Monk (1 light to 10 dark)."""
     del radii_mm, bends_deg

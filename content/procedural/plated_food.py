@@ -34,11 +34,6 @@ _GREENS = ("#5f8f2e", "#7fae44", "#4f7a2a")
 _SAUCES = ("#a8321a", "#8a4a1c", "#c98a24", "#6a2a14", "#7a8a3a")
 
 
-def choose_meal(number: int) -> str:
-    """The meal of a number; consecutive numbers take them in turn."""
-    return in_turn(tuple(_MEALS), number)
-
-
 def serve(name: str, seed: int, radius: float, slot: int, rng: VariantRng) -> Dish:
     """A meal on a plate.
 
@@ -375,4 +370,4 @@ EMPTY_PLATES = 42
 
 def meal_on_plate(seed: int) -> str:
     """The meal of a variant of the family ``plate``; empty = none."""
-    return choose_meal(seed - EMPTY_PLATES) if seed >= EMPTY_PLATES else ""
+    return in_turn(tuple(_MEALS), seed - EMPTY_PLATES) if seed >= EMPTY_PLATES else ""

@@ -214,6 +214,5 @@ def _peen() -> Patch:
                 (0.059, 0.0105, 0.0012)]  # fmt: skip
     corners = ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))
     loops = np.array([[(a * w, -y, b * thin) for a, b in corners] for y, w, thin in stations])
-    return join_patches(
-        [shapes.grid(loops), shapes.fan(loops[0, :0:-1]), shapes.fan(loops[-1, :-1])]
-    )
+    parts = [shapes.grid(loops), shapes.fan(loops[0, :0:-1]), shapes.fan(loops[-1, :-1])]
+    return join_patches(parts)

@@ -91,10 +91,8 @@ def _pour(
     low = walls.floor_m if see_through or drink.clear else max(walls.floor_m, top - 0.003)
     side = _side(walls, low + _GAP_M, top)
     edge = side[-1][0]
-    patches = [
-        shapes.lathe([(0.0, side[0][1]), *side], 40, slot),
-        shapes.lathe(_surface(edge, top), 40, slot + 1),
-    ]
+    profile = [(0.0, side[0][1]), *side]
+    patches = [shapes.lathe(profile, 40, slot), shapes.lathe(_surface(edge, top), 40, slot + 1)]
     body = liquid(drink, rng)
     above = body
     if drink.surface:

@@ -64,8 +64,7 @@ def pram(rng: VariantRng) -> Solid:
     else:
         parts.append(block((-0.1, -y, 0.42), (0.22, y, 0.47), 0.02, 1))
         rest = block((-0.02, -y, 0.0), (0.02, y, 0.55), 0.02, 1).rotated("y", -0.38)
-        parts.append(rest.moved(-0.1, 0.0, 0.45))
-        parts.append(block((0.2, -y, 0.28), (0.24, y, 0.45), 0.015, 1))
+        parts += [rest.moved(-0.1, 0.0, 0.45), block((0.2, -y, 0.28), (0.24, y, 0.45), 0.015, 1)]
         parts.append(block((0.24, -y, 0.24), (0.4, y, 0.28), 0.0, 3))
         parts += [_hood(0.9, (-0.24, 0.24), y, 0.7 * math.pi)]
         parts.append(bar((0.2, -y, 0.66), (0.2, y, 0.66), 0.014, 6, 3))
@@ -76,9 +75,8 @@ def pram(rng: VariantRng) -> Solid:
         painted_material("#1a1a1b", 0.8),
         painted_material("#26272a", 0.7),
     )
-    return make_solid(
-        on_ground(parts), materials, [hulls.box((-0.4, -wide, 0.0), (0.4, wide, 0.75))]
-    )
+    shells = [hulls.box((-0.4, -wide, 0.0), (0.4, wide, 0.75))]
+    return make_solid(on_ground(parts), materials, shells)
 
 
 def _wheel(radius: float) -> list[Patch]:
@@ -122,9 +120,8 @@ def suitcase(rng: VariantRng) -> Solid:
         painted_material("#151516", 0.7),
         Material(draw_linear(_FABRICS, 0.1, rng), 0.9),
     )
-    return make_solid(
-        on_ground(parts), materials, [hulls.box((-0.1, -0.15, 0.0), (0.1, 0.15, 0.9 * high))]
-    )
+    shells = [hulls.box((-0.1, -0.15, 0.0), (0.1, 0.15, 0.9 * high))]
+    return make_solid(on_ground(parts), materials, shells)
 
 
 def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:

@@ -40,9 +40,7 @@ def airframe(seed: int) -> Solid:
 def gimbal(seed: int) -> Solid:
     """A camera on its yoke, 0.05 m long; its lens ends at x = 0.025 m, 0.02 m above the ground."""
     grey = ("#1d1e20", "#3a3c40")[seed % 2]
-    parts = [
-        block((-0.025, -0.02, 0.0), (0.025, 0.02, 0.04), 0.005),
-        tube([(-0.01, 0.0, 0.035), (-0.01, 0.0, 0.08)], 0.006),
-    ]
+    path = [(-0.01, 0.0, 0.035), (-0.01, 0.0, 0.08)]
+    parts = [block((-0.025, -0.02, 0.0), (0.025, 0.02, 0.04), 0.005), tube(path, 0.006)]
     box = hulls.box((-0.025, -0.02, 0.0), (0.025, 0.02, 0.08))
     return make_solid(parts, (painted_material(grey, 0.4),), [box])

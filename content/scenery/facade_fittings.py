@@ -54,14 +54,13 @@ def air_conditioner(y: float, z: float, rng: VariantRng) -> Patch:
     fan = circle(0.4 * h, 10, (y + 0.58 * w, z + 0.5 * h))
     feet = [(0.0, d, y + k * w, y + k * w + 0.04, z - 0.04, z) for k in (0.12, 0.84)]
     pipe = [(0.0, 0.05, y + w + 0.03, y + w + 0.09, z + 0.1, z + rng.between(0.8, 1.8))]
-    return join_patches(
-        [
-            ledges([body], WHITE),
-            polygon(0.062 + d, fan, DARK),
-            ledges(feet, METAL),
-            ledges(pipe, WHITE),
-        ]
-    )
+    parts = [
+        ledges([body], WHITE),
+        polygon(0.062 + d, fan, DARK),
+        ledges(feet, METAL),
+        ledges(pipe, WHITE),
+    ]
+    return join_patches(parts)
 
 
 def flower_box(y_m: Span, z: float, x: float, rng: VariantRng) -> Patch:

@@ -69,9 +69,8 @@ def straw_bale(rng: VariantRng) -> Solid:
                 ]
     straw = patterned_material("texture/crop?kind=stubble&seed=1", 1.5, 0.95, (0.85, 0.8, 0.7))
     film = painted_material(rng.choose(("#dfe3df", "#aeb9a6", "#23262a", "#dfe3df")), 0.3)
-    return basic_shapes.make_solid(
-        parts, (film if kind == "wrapped" else straw, painted_material("#8d7d52", 0.9)), hull
-    )
+    materials = (film if kind == "wrapped" else straw, painted_material("#8d7d52", 0.9))
+    return basic_shapes.make_solid(parts, materials, hull)
 
 
 def power_pylon(seed: int, span_m: float) -> Solid:

@@ -175,9 +175,8 @@ def _stand(
     ]
     bark = Material(hex_to_linear("#5b5046"), 0.95, specular=0.2, role="bark")
     dark = patterned_material("texture/foliage?seed=0", 1.6, 0.95, hex_to_linear("#6d8049"))
-    wood = finish_mesh(
-        join_patches([*trunks, *cores]), (bark, replace(dark, specular=0.2, role="leaf")), 70.0
-    )
+    pieces = [*trunks, *cores]
+    wood = finish_mesh(join_patches(pieces), (bark, replace(dark, specular=0.2, role="leaf")), 70.0)
     parts = [_clumps(c, size, count * 2 // 3 if c.is_conifer else count, rng) for c in crowns]
     parts += [_clumps(bush, 0.75 * size, 8, rng) for bush in bushes]
     leaves = card_mesh(join_cards(parts), _foliage(season, rng), _SOFTNESS, rng)

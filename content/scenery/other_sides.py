@@ -89,9 +89,8 @@ def plain_wall(plan: Design, width_m: float, bays: int, rng: VariantRng) -> Patc
     h = min(1.4, plan.window_m[1])
     if plan.ribbons:
         holes, parts = street_side.ribbons(plan, (-half, half), rng)
-        return join_patches(
-            [facade.cut_openings((-half, half), (0.0, plan.eaves_m), holes), *parts]
-        )
+        pieces = [facade.cut_openings((-half, half), (0.0, plan.eaves_m), holes), *parts]
+        return join_patches(pieces)
     holes, parts = [], []
     skipped = rng.choose((0.0, 0.1, 0.3))
     for floor in range(plan.floors):

@@ -129,10 +129,8 @@ def fountain(rng: VariantRng) -> Solid:
     profile = [(radius + 0.25, 0.0), (radius + 0.25, 0.12), (radius, 0.14), (radius, rim - 0.08),
                (radius + 0.08, rim - 0.06), (radius + 0.08, rim), (radius - 0.24, rim),
                (radius - 0.24, rim - 0.16)]  # fmt: skip
-    parts = [
-        lathe(profile, sides),
-        lathe([(radius - 0.24, rim - 0.16), (0.0, rim - 0.16)], sides, 1),
-    ]
+    surface = [(radius - 0.24, rim - 0.16), (0.0, rim - 0.16)]
+    parts = [lathe(profile, sides), lathe(surface, sides, 1)]
     if kind == "bowl":
         z = rim + rng.between(0.7, 1.0)
         bowl = [(0.22, 0.0), (0.16, 0.3), (0.18, z - 0.15), (0.9, z + 0.15), (0.95, z + 0.22),

@@ -190,7 +190,8 @@ def _lobed(
     lobes: Sequence[_Ball], height: float, green: int, flowers: str, rng: VariantRng
 ) -> Solid:
     """A plant that fills balls (x, y, z, radius), with opaque cores inside them."""
-    cores = [ball(lambda d: d, 5, 7).scaled(k, k, k).moved(x, y, z) for x, y, z, k in _inner(lobes)]
+    inner = [(x, y, z, 0.72 * r) for x, y, z, r in lobes]
+    cores = [ball(lambda d: d, 5, 7).scaled(k, k, k).moved(x, y, z) for x, y, z, k in inner]
     size = min(0.42, 0.16 + 0.16 * height)
     parts = []
     for x, y, z, r in lobes:
@@ -205,11 +206,6 @@ def _lobed(
         parts.append(leaf_cards.cards_about(at, outward, sizes, slots, 0.35, rng))
     low = [replace(core, corners_m=np.maximum(core.corners_m, [-9.0, -9.0, 0.0])) for core in cores]
     return _planted(low, leaf_cards.join_cards(parts), _GREENS[green], rng, flowers)
-
-
-def _inner(lobes: Sequence[_Ball]) -> list[_Ball]:
-    """The opaque balls inside of balls of leaves."""
-    return [(x, y, z, 0.72 * r) for x, y, z, r in lobes]
 
 
 def _planted(

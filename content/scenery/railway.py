@@ -35,8 +35,7 @@ def railway_track(seed: int, length_m: float) -> Solid:
     z = np.array([0.0, _BED_TOP_M, _BED_TOP_M, 0.0])
     points = np.stack([np.column_stack([np.full(4, x), y, z]) for x in (-half, half)], axis=1)
     parts = [surface_shapes.grid(points, np.array([0.0, length_m / 3.0]), y / 3.0)]
-    for at in np.arange(-half + 0.3, half, _PITCH_M):
-        parts.append(_sleeper(float(at)))
+    parts += [_sleeper(float(at)) for at in np.arange(-half + 0.3, half, _PITCH_M)]
     for way in (-1.0, 1.0):
         near = way * 0.5 * GAUGE_M
         a, b = sorted((near, near + way * HEAD_M))

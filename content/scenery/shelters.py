@@ -45,8 +45,7 @@ def bus_shelter(rng: VariantRng) -> Solid:
     ends = (-half, half) if rng.chance(0.6) else (half,)
     for y in ends:
         parts.append(block((-x + 0.05, y - 0.005, 0.15), (x - 0.4, y + 0.005, high - 0.15), 0.0, 1))
-    parts += _shelter_roof(kind, x, half, high)
-    parts += _seat(x, half, rng)
+    parts += [*_shelter_roof(kind, x, half, high), *_seat(x, half, rng)]
     # An advertisement stands across the end of the waiting area.
     low = 0.35
     panel = rounded_box((1.3, 0.16, 1.9), 0.03, 1).moved(-x + 0.72, -half + 0.1, low + 0.95)

@@ -117,15 +117,14 @@ def _door(hole: Opening, shop: Premises, rng: VariantRng) -> Patch:
     x, head, w = -hole.recess_m, min(z1 - 0.25, z0 + 2.2), 0.12
     glass = Opening((y0 + w, y1 - w), (z0 + rng.choose((0.15, 0.5, 0.8)), head - w), 0.0)
     light = Opening(hole.y_m, (head, z1), 0.0)
-    return join_patches(
-        [
-            facade.reveal(hole, hole.recess_m + 0.01, shop.slot),
-            rectangles(x, [(y0, y1, z0, z1)], shop.paint),
-            facade.panes(glass, rng, x + 0.004, DISPLAY),
-            facade.panes(replace(light, y_m=(y0 + w, y1 - w)), rng, x + 0.004, DISPLAY),
-            ledges([(x, x + 0.06, y1 - 0.1, y1 - 0.06, z0 + 0.9, z0 + 1.3)], METAL),
-        ]
-    )
+    parts = [
+        facade.reveal(hole, hole.recess_m + 0.01, shop.slot),
+        rectangles(x, [(y0, y1, z0, z1)], shop.paint),
+        facade.panes(glass, rng, x + 0.004, DISPLAY),
+        facade.panes(replace(light, y_m=(y0 + w, y1 - w)), rng, x + 0.004, DISPLAY),
+        ledges([(x, x + 0.06, y1 - 0.1, y1 - 0.06, z0 + 0.9, z0 + 1.3)], METAL),
+    ]
+    return join_patches(parts)
 
 
 def _boards(shop: Premises, free_m: Span, rng: VariantRng) -> list[Patch]:
@@ -142,8 +141,7 @@ def _boards(shop: Premises, free_m: Span, rng: VariantRng) -> list[Patch]:
         parts.append(ledges([(0.0, 0.06, *free_m, low - 0.04, high)], shop.paint))
     z = 0.5 * (low + high - tall)
     place = (middle - 0.5 * long, middle + 0.5 * long, z, z + tall)
-    parts.append(ledges([(0.0, 0.1, *place)], METAL))
-    parts.append(rectangles(0.104, [place], SIGN, [image]))
+    parts += [ledges([(0.0, 0.1, *place)], METAL), rectangles(0.104, [place], SIGN, [image])]
     if rng.chance(0.35):
         parts.append(_hanging_board(rng.choose(free_m), shop, image, rng))
     if rng.chance(0.4):

@@ -128,10 +128,8 @@ def _pasted(radius: float, turn: tuple[float, float], z_m: tuple[float, float], 
 def street_name_plate(rng: VariantRng) -> Solid:
     """One or two name plates of a crossing on a post, 0.8-0.95 x 0.2 m. Slots: post, plates."""
     high, half = rng.between(2.5, 2.9, "height_m"), 0.5 * rng.between(0.76, 0.94, "width_m")
-    parts = [
-        post(0.03, (0.0, high)),
-        lathe([(0.034, high), (0.03, high + 0.03), (0.0, high + 0.04)], 8),
-    ]
+    profile = [(0.034, high), (0.03, high + 0.03), (0.0, high + 0.04)]
+    parts = [post(0.03, (0.0, high)), lathe(profile, 8)]
     for k in range(rng.choose((1, 2, 2))):
         z = high - 0.24 * (k + 1)
         board = block((-0.006, -half, z), (0.006, half, z + 0.2), 0.004)
@@ -146,6 +144,5 @@ def street_name_plate(rng: VariantRng) -> Solid:
         printed_material(f"texture/street_name?seed={(rng.seed + k) % STREET_NAMES}", 0.35)
         for k in (0, 5)
     ]
-    return make_solid(
-        parts, (worn_steel(rng), *names), [hulls.frustum((0.03, 0.0), (0.03, high), 8)]
-    )
+    materials = (worn_steel(rng), *names)
+    return make_solid(parts, materials, [hulls.frustum((0.03, 0.0), (0.03, high), 8)])

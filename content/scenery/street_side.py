@@ -171,8 +171,7 @@ def _gates(plan: Design, part: Stretch, rng: VariantRng) -> Patch:
         if kind == "gate":
             wide = min(3.6, pitch - 0.4)
             hole = Opening((y - 0.5 * wide, y + 0.5 * wide), (0.02, high), 0.2)
-            parts.append(facade.garage_door(hole))
-            parts.append(_dock(hole, rng))
+            parts += [facade.garage_door(hole), _dock(hole, rng)]
         elif kind == "door":
             hole = Opening((y - 0.55, y + 0.55), (0.15, 2.3), 0.15)
             parts += [facade.door(hole, rng), *fittings.porch(y, 2.3, "canopy", rng)]

@@ -64,8 +64,7 @@ def utility_pole(seed: int, span_m: float) -> Solid:
         pole = pole.rotated("z", np.pi / 8)
     else:
         pole = cone((radii[0], 0.0), (radii[1], high), 12)
-    parts = [pole, *_cross_arms(kind.endswith("double"), radii[1])]
-    parts += _fittings(kind, radii[1], rng)
+    parts = [pole, *_cross_arms(kind.endswith("double"), radii[1]), *_fittings(kind, radii[1], rng)]
     cables = _half_spans(span_m, radii[1]) if span_m else []
     body, cables = ([part.rotated("z", 0.5 * np.pi) for part in piece] for piece in (parts, cables))
     wood = patterned_material("texture/bark?seed=1", 1.0, 0.9, rng.choose(((0.17, 0.13, 0.1),

@@ -216,8 +216,7 @@ def skip_container(rng: VariantRng) -> Solid:
         heap = mound((2 * wide - 0.12, 2 * top_half - 0.12), rng.between(0.2, 0.5), (8, 14), rng)
         parts.append(heap.moved(0.0, 0.0, high - 0.12).painted(2))
     if load in {"wood", "rubble"}:
-        for _ in range(7 if load == "wood" else 3):
-            parts.append(_plank(rng, high, wide, top_half))
+        parts += [_plank(rng, high, wide, top_half) for _ in range(7 if load == "wood" else 3)]
     fill = {
         "rubble": patterned_material("texture/concrete?seed=3", 0.8, 0.95, (0.75, 0.66, 0.6)),
         "wood": patterned_material("texture/wood_planks?seed=2", 0.9, 0.9, (0.8, 0.7, 0.6)),

@@ -58,7 +58,8 @@ def _check_export(
     examined: Examined, root: Path, reader: Reader, stated: Sequence[labelled_images.LabelledImage]
 ) -> Finding:
     contradictions = Contradictions()
-    figures: dict[str, Figure] = {"reader": " ".join(f"{k} {v}" for k, v in _releases(reader))}
+    releases = sorted(reader.versions().items())
+    figures: dict[str, Figure] = {"reader": " ".join(f"{k} {v}" for k, v in releases)}
     try:
         # Warnings of readers concern their packages.
         with warnings.catch_warnings():
@@ -103,7 +104,3 @@ def _compare(
         if score < PERFECT:
             contradictions.add(f"labels as predictions: AP of {noun} {score:.4f}, expected 1")
     return figures
-
-
-def _releases(reader: Reader) -> Sequence[tuple[str, str]]:
-    return sorted(reader.versions().items())

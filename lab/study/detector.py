@@ -107,11 +107,7 @@ class Detector(nn.Module):
 
     @staticmethod
     def load(path: Path) -> "Detector":
-        """Read a file of ``save``, ready to detect.
-
-        Raises:
-            ConfigError: it is no such file.
-        """
+        """Read a file of ``save``, ready to detect. Raises ConfigError if it is no such file."""
         try:
             content = torch.load(path, weights_only=True)
             model = Detector(content["classes"], content["size_px"], content["width"])

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -289,13 +290,9 @@ def _read_coco(root: Path, paths: Sequence[Path], most: int | None) -> RealSet:
             _Frame(image.image_id, file, image.objects, image.size_px)
             for image, file in zip(labels.images, files, strict=True)
         )
-    pictures = sorted(_readable(frames, most, skipped), key=_by_id)
+    pictures = sorted(_readable(frames, most, skipped), key=attrgetter("image_id"))
     source = paths[0] if len(paths) == 1 else paths[0].parent
     return _checked(RealSet(source, tuple(pictures), ids, skipped))
-
-
-def _by_id(picture: RealPicture) -> int:
-    return picture.image_id
 
 
 def _find_images(root: Path, annotations: Path, names: Sequence[str]) -> list[Path]:

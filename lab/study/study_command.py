@@ -1,5 +1,6 @@
 """``gen-data study``: the value of changes of a configuration on real pictures."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,7 +80,7 @@ def study(
         experiment = Experiment(
             real_folder, variants, split=split, n=n, seeds=seeds, steps=steps, size_px=size
         )
-        findings = run_study(experiment, out, workers=workers, report=_echo)
+        findings = run_study(experiment, out, workers=workers, report=partial(click.echo, err=True))
     else:
         raise ConfigError(
             "there is nothing to compare; expected a configuration with --without, --set, "
@@ -124,10 +125,6 @@ def _named_files(texts: tuple[str, ...]) -> dict[str, Path]:
     if len(files) < 2:
         raise ConfigError("--results: expected at least two files with different names")
     return files
-
-
-def _echo(line: str) -> None:
-    click.echo(line, err=True)
 
 
 def _print(findings: dict[str, Any], out: Path) -> None:

@@ -14,13 +14,7 @@ from numpy.typing import NDArray
 
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
-from gen_data.core.sample import (
-    TRACK_STATES,
-    EgoTruth,
-    PointTracks,
-    Sample,
-    SensorTracks,
-)
+from gen_data.core.sample import TRACK_STATES, EgoTruth, PointTracks, Sample, SensorTracks
 from gen_data.core.serialization import canonical_json, from_plain
 from gen_data.exporters.tapvid import TapVid
 from tests.exporters.drives import drive_info

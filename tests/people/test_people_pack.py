@@ -36,8 +36,7 @@ def write_source(folder: Path) -> None:
     left = body.points_m[eyes[:, 0], 1] > 0.0
     groups |= {"helper-l-eye": eyes[left], "helper-r-eye": eyes[~left]}
     for name, faces in groups.items():
-        lines.append(f"g {name}")
-        lines += [f"f {a}/1 {b}/1 {c}/1" for a, b, c in faces + 1]
+        lines += [f"g {name}", *(f"f {a}/1 {b}/1 {c}/1" for a, b, c in faces + 1)]
     (data / "3dobjs" / "base.obj").write_text("\n".join(lines), "utf-8")
     rig = {
         bone: {

@@ -48,11 +48,7 @@ SURFACES: Mapping[str, FoodSurface] = load_table(_PACKAGE, "food_surfaces", Food
 
 
 def food_surface(seed: int, kind: str = "bread") -> TextureData:
-    """A surface of ``SURFACES``, 512 x 512.
-
-    Raises:
-        AssetError: if there is no such kind.
-    """
+    """A surface of ``SURFACES``, 512 x 512. Raises AssetError if there is no such kind."""
     check_option("food_surface", "kind", kind, tuple(SURFACES))
     style, rng = SURFACES[kind], variant_rng(f"food_surface/{kind}", seed)
     ground = color(in_turn(style.grounds, seed))

@@ -154,11 +154,7 @@ def pear_skin(rng: VariantRng) -> TextureData:
 
 
 def fruit_skin(seed: int, kind: str = "plum") -> TextureData:
-    """A skin of ``SKINS``.
-
-    Raises:
-        AssetError: if there is no such kind.
-    """
+    """A skin of ``SKINS``. Raises AssetError if there is no such kind."""
     check_option("fruit_skin", "kind", kind, tuple(SKINS))
     style, rng = SKINS[kind], variant_rng(f"fruit_skin/{kind}", seed)
     y, x = rows_and_columns()
@@ -209,11 +205,7 @@ _CUTS: Mapping[str, tuple[str, str, str]] = {
 
 
 def fruit_cut(seed: int, kind: str = "orange") -> TextureData:
-    """The face of a halved fruit.
-
-    Raises:
-        AssetError: if there is no such kind.
-    """
+    """The face of a halved fruit. Raises AssetError if there is no such kind."""
     check_option("fruit_cut", "kind", kind, tuple(_CUTS))
     rng = variant_rng(f"fruit_cut/{kind}", seed)
     rim, flesh, core = (color(code) for code in _CUTS[kind])

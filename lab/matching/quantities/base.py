@@ -18,6 +18,11 @@ def identity(value: float) -> float:
     return value
 
 
+def power_of_two(coordinate: float) -> float:
+    """A parameter whose coordinate is its logarithm, base 2."""
+    return float(2.0**coordinate)
+
+
 @dataclass(frozen=True)
 class CameraQuantity:
     """A parameter of a camera's image pipeline.

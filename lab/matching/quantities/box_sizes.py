@@ -45,14 +45,9 @@ def _slope(focal_heights: float) -> float:
     return 1.0
 
 
-def to_factor(coordinate: float) -> float:
-    """Factor of its logarithm, base 2."""
-    return float(2.0**coordinate)
-
-
 BOX_SIZES = base.LabelQuantity(
     "box sizes", "factor", "mean log2 of the size of boxes over that of the image",
     measure, _slope, _change,
     indirect_inference.Axis(-3.0, 3.0, step=0.25, plausible=1.0, enough=0.15, varies=False),
-    to_value=to_factor,
+    to_value=base.power_of_two,
 )  # fmt: skip

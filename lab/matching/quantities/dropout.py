@@ -7,7 +7,7 @@ are lost first.
 import math
 
 from gen_data.lab.matching import indirect_inference, recordings
-from gen_data.lab.matching.quantities.base import LidarQuantity, round_digits
+from gen_data.lab.matching.quantities.base import LidarQuantity, power_of_two, round_digits
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 
@@ -24,13 +24,8 @@ def _apply(sensor: LidarSensor, coordinate: float) -> LidarSensor:
     return sensor.model_copy(update={"window": round_digits(2.0**coordinate)})
 
 
-def to_transmittance(coordinate: float) -> float:
-    """Transmittance of its logarithm, base 2."""
-    return float(2.0**coordinate)
-
-
 DROPOUT = LidarQuantity(
     "dropout", "transmittance", "log2 of points per sweep", "window", measure, _start, _apply,
     indirect_inference.Axis(-4.0, 0.0, step=0.25, plausible=1.0, enough=0.05, varies=False),
-    to_value=to_transmittance,
+    to_value=power_of_two,
 )  # fmt: skip

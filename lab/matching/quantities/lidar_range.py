@@ -8,7 +8,12 @@ import math
 import numpy as np
 
 from gen_data.lab.matching import indirect_inference, recordings
-from gen_data.lab.matching.quantities.base import LidarQuantity, round_digits, with_model
+from gen_data.lab.matching.quantities.base import (
+    LidarQuantity,
+    power_of_two,
+    round_digits,
+    with_model,
+)
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 SHARE = 99.9
@@ -30,14 +35,9 @@ def _apply(sensor: LidarSensor, coordinate: float) -> LidarSensor:
     )
 
 
-def to_range_m(coordinate: float) -> float:
-    """Range of its logarithm, base 2."""
-    return float(2.0**coordinate)
-
-
 RANGE = LidarQuantity(
     "range", "m", "log2 of the range of 99.9 % of the points", "model.range_m",
     measure, _start, _apply,
     indirect_inference.Axis(0.0, 10.0, step=0.1, plausible=1.0, enough=0.05, varies=False),
-    to_value=to_range_m,
+    to_value=power_of_two,
 )  # fmt: skip

@@ -61,7 +61,7 @@ def _start(pipeline: ImagePipeline) -> float:
 
 
 def to_electrons(coordinate: float) -> float:
-    """Full-well capacity of its logarithm, base 2, to three digits."""
+    """Electrons of their logarithm, base 2, to three digits."""
     return float(f"{2.0**coordinate:.3g}")
 
 

@@ -33,13 +33,8 @@ def _start(pipeline: ImagePipeline) -> float:
 
 def _apply(pipeline: ImagePipeline, coordinate: float) -> ImagePipeline:
     sensor = pipeline.image_sensor or ImageSensor()
-    changed = sensor.model_copy(update={"read_noise_e": Constant(to_electrons(coordinate))})
+    changed = sensor.model_copy(update={"read_noise_e": Constant(noise.to_electrons(coordinate))})
     return pipeline.model_copy(update={"image_sensor": changed})
-
-
-def to_electrons(coordinate: float) -> float:
-    """Standard deviation of its logarithm, base 2, to three digits."""
-    return float(f"{2.0**coordinate:.3g}")
 
 
 def _fields(value: Any) -> Mapping[str, Any]:
@@ -52,5 +47,5 @@ READ_NOISE = base.CameraQuantity(
     "image_pipeline.image_sensor.read_noise_e",
     measure, _start, _apply, _fields,
     Axis(math.log2(LEAST_E), 8.0, step=0.5, plausible=2.0, enough=0.5, varies=False, late=True),
-    to_value=to_electrons,
+    to_value=noise.to_electrons,
 )  # fmt: skip
