@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "tests/documents/english.yaml"
 DOCUMENTS = ("*.md", "docs/*.md", "docs/decisions/*.md", "docs/tutorials/*.md", "examples/**/*.md")
 SOURCES = (
-    *(f"generator/{folder}/**/*.py" for folder in ("api", "cli", "config")),
+    *(f"generator/{folder}/**/*.py" for folder in ("api", "cli", "config", "core")),
     *(f"{folder}/**/*.py" for folder in ("randomizers", "scene_templates", "exporters")),
 )
 HISTORY = {"CHANGELOG.md", "docs/migration.md"}
@@ -35,7 +35,9 @@ TICS = {
 }
 """Patterns by name, without regard to capitals."""
 TIC = re.compile("|".join(f"(?:{tic})" for tic in TICS.values()), re.IGNORECASE | re.MULTILINE)
-CODE = re.compile(r"^```.*?^```$|`[^`\n]*`|\]\([^)\s]*\)", re.MULTILINE | re.DOTALL)
+CODE = re.compile(r"^```.*?^```$|``[^`\n]+``|`[^`\n]*`|\]\([^)\s]*\)", re.MULTILINE | re.DOTALL)
+NAME = re.compile(r"(?<=^        )\w+(?=: )", re.MULTILINE)
+"""Names of parameters and attributes in docstrings."""
 
 
 def files() -> list[Path]:
@@ -49,14 +51,17 @@ def name_of(path: Path) -> str:
 
 
 def prose(path: Path) -> str:
-    """Text of a document without code, or all strings of a module: docstrings and messages."""
+    """Text of a document, or all strings of a module (docstrings, messages), without code."""
     text = path.read_text("utf-8")
     if path.suffix == ".md":
         return CODE.sub("", text)
-    nodes = ast.walk(ast.parse(text))
-    return "\n".join(
-        node.value for node in nodes if isinstance(node, ast.Constant) and type(node.value) is str
+    strings = (
+        node.value
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Constant) and type(node.value) is str
     )
+    texts = "\n".join(text for text in strings if not text.isidentifier())
+    return NAME.sub("name", CODE.sub("", texts))
 
 
 def tics(text: str) -> Counter[str]:
