@@ -16,8 +16,9 @@ import yaml
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "tests/documents/english.yaml"
 DOCUMENTS = ("*.md", "docs/*.md", "docs/decisions/*.md", "docs/tutorials/*.md", "examples/**/*.md")
+FOLDERS = ("annotations", "api", "assemble", "cli", "config", "core", "pipeline", "sensors")
 SOURCES = (
-    *(f"generator/{folder}/**/*.py" for folder in ("api", "cli", "config", "core")),
+    *(f"generator/{folder}/**/*.py" for folder in FOLDERS),
     *(f"{folder}/**/*.py" for folder in ("randomizers", "scene_templates", "exporters")),
 )
 HISTORY = {"CHANGELOG.md", "docs/migration.md"}
