@@ -16,7 +16,9 @@ import yaml
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "tests/documents/english.yaml"
 DOCUMENTS = ("*.md", "docs/*.md", "docs/decisions/*.md", "docs/tutorials/*.md", "examples/**/*.md")
-FOLDERS = ("annotations", "api", "assemble", "cli", "config", "core", "pipeline", "sensors")
+FOLDERS = (
+    *("annotations", "api", "assemble", "cli", "config", "core", "pipeline", "runner", "sensors"),
+)
 SOURCES = (
     *(f"generator/{folder}/**/*.py" for folder in FOLDERS),
     *(f"{folder}/**/*.py" for folder in ("randomizers", "scene_templates", "exporters")),

@@ -165,7 +165,7 @@ def test_a_plan_without_sums_is_restored_from_its_copy_by_its_configuration(data
     # Another configuration is refused, and nothing is changed.
     (dataset / "plan.json").write_text("{")
     damaged = tree_digest(dataset)
-    with pytest.raises(StorageError, match=r"not those of this data set; nothing was changed"):
+    with pytest.raises(StorageError, match=r"not this data set's; nothing was changed"):
         make(dataset, N + 1, SHARD_SIZE, settings=REPAIR)
     assert tree_digest(dataset) == damaged
 

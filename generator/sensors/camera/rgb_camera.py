@@ -208,7 +208,7 @@ class RgbCamera(Mounted):
             raise errors.SampleError(
                 f"sensors '{left.name}' and '{right.name}' are not a rectified pair: {error};"
                 " mount them on one rig with the same size, field of view, lens and angles, the"
-                " second one straight to the right of the first, and vary neither alone by a randomizer"
+                " second straight to the right of the first, and vary neither alone by a randomizer"
             ) from error
         other = renderer.render(scene, right, frozenset({Channel.Z_DEPTH}))
         left_px = disparity_px(reading.channels[Channel.Z_DEPTH], scale)
