@@ -17,7 +17,8 @@ ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "tests/documents/english.yaml"
 DOCUMENTS = ("*.md", "docs/*.md", "docs/decisions/*.md", "docs/tutorials/*.md", "examples/**/*.md")
 FOLDERS = (
-    *("annotations", "api", "assemble", "cli", "config", "core", "pipeline", "runner", "sensors"),
+    *("annotations", "api", "assemble", "assets", "cli", "config", "core", "physics", "pipeline"),
+    *("rooms", "runner", "sensors"),
 )
 SOURCES = (
     *(f"generator/{folder}/**/*.py" for folder in FOLDERS),
@@ -39,6 +40,8 @@ TICS = {
 """Patterns by name, without regard to capitals."""
 TIC = re.compile("|".join(f"(?:{tic})" for tic in TICS.values()), re.IGNORECASE | re.MULTILINE)
 CODE = re.compile(r"^```.*?^```$|``[^`\n]+``|`[^`\n]*`|\]\([^)\s]*\)", re.MULTILINE | re.DOTALL)
+PATH = re.compile(r"[\w.:]+")
+"""Keys, and names of modules and their objects."""
 NAME = re.compile(r"(?<=^        )\w+(?=: )", re.MULTILINE)
 """Names of parameters and attributes in docstrings."""
 
@@ -63,7 +66,7 @@ def prose(path: Path) -> str:
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Constant) and type(node.value) is str
     )
-    texts = "\n".join(text for text in strings if not text.isidentifier())
+    texts = "\n".join(text for text in strings if not PATH.fullmatch(text))
     return NAME.sub("name", CODE.sub("", texts))
 
 
