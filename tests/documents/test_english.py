@@ -18,7 +18,7 @@ TABLE = ROOT / "tests/documents/english.yaml"
 DOCUMENTS = ("*.md", "docs/*.md", "docs/decisions/*.md", "docs/tutorials/*.md", "examples/**/*.md")
 FOLDERS = (
     *("annotations", "api", "assemble", "assets", "cli", "config", "core", "physics", "pipeline"),
-    *("rooms", "runner", "sensors"),
+    *("packs", "preview", "report", "roads", "rooms", "runner", "sensors", "sky", "traffic", "usd"),
 )
 SOURCES = (
     *(f"generator/{folder}/**/*.py" for folder in FOLDERS),

@@ -76,7 +76,7 @@ def _blurred_layer(image: Float32, own: NDArray[np.bool_], radius_px: float) -> 
 
 
 def _lay_over(below: Float32, layer: Float32) -> None:
-    """Lay a layer [h, w, 4] over what is below it, in place."""
+    """Composite a layer [h, w, 4] over the image below it, in place."""
     clear = np.float32(1.0) - layer[..., 3]
     # Merged first, as in scale_pixels.
     below *= cv2.merge([clear, clear, clear, clear])
