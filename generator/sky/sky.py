@@ -140,7 +140,7 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     Args:
         d: Unit directions, shape [h, w, 3], each row level.
         sun_altitude_rad: Over the horizon.
-        turbidity: Of the air.
+        turbidity: Turbidity of the air.
     """
     angles = _SkyAngles.of(d, sun_altitude_rad)
     clear_to = daylight.CLEAR_TURBIDITY

@@ -22,6 +22,7 @@ FOLDERS = (
 )
 SOURCES = (
     *(f"generator/{folder}/**/*.py" for folder in FOLDERS),
+    *(f"lab/{folder}/**/*.py" for folder in ("certificate", "environment")),
     *(f"{folder}/**/*.py" for folder in ("randomizers", "scene_templates", "exporters")),
 )
 HISTORY = {"CHANGELOG.md", "docs/migration.md"}
