@@ -40,7 +40,7 @@ def convolve(inner: int, outer: int, stride: int = 1) -> nn.Sequential:
 
 
 class Residual(nn.Module):
-    """Two convolutions beside an identity (He et al., 2016)."""
+    """Two convolutions parallel to an identity (He et al., 2016)."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
@@ -110,7 +110,7 @@ class Detector(nn.Module):
         """Read a file of ``save``, ready to detect.
 
         Raises:
-            ConfigError: it is no such file.
+            ConfigError: it is not such a file.
         """
         try:
             content = torch.load(path, weights_only=True)

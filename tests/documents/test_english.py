@@ -20,9 +20,10 @@ FOLDERS = (
     *("annotations", "api", "assemble", "assets", "cli", "config", "core", "physics", "pipeline"),
     *("packs", "preview", "report", "roads", "rooms", "runner", "sensors", "sky", "traffic", "usd"),
 )
+LABORATORY = ("certificate", "environment", "matching", "study", "write")
 SOURCES = (
     *(f"generator/{folder}/**/*.py" for folder in FOLDERS),
-    *(f"lab/{folder}/**/*.py" for folder in ("certificate", "environment")),
+    *(f"lab/{folder}/**/*.py" for folder in LABORATORY),
     *(f"{folder}/**/*.py" for folder in ("randomizers", "scene_templates", "exporters")),
 )
 HISTORY = {"CHANGELOG.md", "docs/migration.md"}
