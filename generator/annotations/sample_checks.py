@@ -217,7 +217,7 @@ def _identity_faults(
         named = info.categories[number - 1]
         yield "category_id", f"{number} is '{named}', but its category is '{instance.category}'"
     if not instance.annotated:
-        yield "instance", "is annotated, although it is not in the scene"
+        yield "instance", "is annotated, although its instance is not"
 
 
 def _count_ids(ids: NDArray[np.uint16]) -> NDArray[np.intp]:
