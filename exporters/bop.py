@@ -456,10 +456,10 @@ _DATASET_INFO = """\
 Synthetic images of the camera `{camera}`; {models} models in millimetres.
 
 * `objects.json` maps each obj_id to its asset, scale and category.
-* `models_info.json` has symmetries of shape and own materials: those that assets state, or else
-  those that surface and colours show to within a hundredth of the diameter.
+* `models_info.json` has symmetries of shape and own materials: as stated by assets, or else found
+  in the surface and its colours to within a hundredth of the diameter.
 * For meshes of your own, `file_origin_mm` in `models_info.json` is the origin of your file in the
   frame of the model: subtract it to get coordinates of the file, scaled and upright.
 * `cam_K` has pixel centres at i + 0.5.
-* Vertex colours are those of the asset; images may show the object in other materials.
+* Vertex colours are the asset's; images may show the object in other materials.
 """

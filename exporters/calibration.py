@@ -60,7 +60,7 @@ class CalibrationFiles(base.ExporterBase):
         if not _cameras(info):
             raise errors.ConfigError(
                 f"exporter '{self.type}': no camera has a calibration; add an rgb_camera whose "
-                "lens is no panorama"
+                "lens is not a panorama"
             )
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

@@ -11,13 +11,13 @@
 * **Stuff** is one segment per category and image: scenery that has an instance and no annotation
   (``building``, ``tree``, ``table``, ...), by its category; where images of depth are written, also
   ``road``, ``pavement``, ``grass`` and ``sky`` (see ``background_surfaces``). Categories of stuff
-  that occur in the data set have the ids after the things', in alphabetical order.
+  that occur in the data set have the ids after the categories of things, in alphabetical order.
 * **Void** are pixels of neither: ignored objects, annotated objects below the thresholds, and
   unannotated objects of a category of things (the hood of the ego vehicle): evaluation
   ignores predictions there.
 
 Ids of segments are numbers within an image, scattered over all colours: things count from 1 by
-instance, stuff follows 65536. Box and area are those of the segment's pixels.
+instance, stuff follows 65536. Box and area refer to the segment's pixels.
 
 References: https://cocodataset.org/#format-data; Kirillov et al., "Panoptic Segmentation", CVPR
 2019; panopticapi.

@@ -1,7 +1,7 @@
 """Classes of ignored regions.
 
-Readers compare a region with the detections of its own class only. A region whose class was left
-out by the label map is therefore listed under every class.
+Readers compare a region only with detections of its class. A region whose class was left out by the
+label map is therefore listed under every class.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -469,9 +469,9 @@ _BOXES = {
 }
 _SCANNED = """\
 velodyne    Points of '{lidar}'; float32 x y z reflectance [0, 1].
-velodyne_labels  One uint32 per point: lower half the category id of what reflected it, upper half
-            row in label_2, from 1; 0 = no row. Objects are what lies in their boxes: points that
-            range noise took more than 3 cm out have no row, and what is deeper inside has one.
+velodyne_labels  One uint32 per point: lower half the category id of the reflector, upper half
+            row in label_2, from 1; 0 = no row. A point belongs to the object whose box it is in:
+            points that range noise took more than 3 cm out have no row.
 """
 _README = """\
 {name}: KITTI object detection format, sensor '{camera}'
@@ -483,7 +483,7 @@ depth_2     z-depth, 16-bit: metres = value * {scale}; 0 = nothing or out of ran
 calib       P0 = P1 = P2 = P3, pixel centres at whole numbers; R0_rect = identity, so the rectified
             frame is the camera's: X right, Y down, Z forward. The virtual IMU is at the scanner.
 {points}label_2     type truncated occluded alpha left top right bottom h w l x y z rotation_y
-            Things without a type of KITTI's (buses, motorcycles) are Misc; sitting people, by
+            Objects without a KITTI type (buses, motorcycles) are Misc; sitting people, by
             their attribute pose, are Person_sitting; scenery that is not annotated has no row.
             Boxes turn about the camera's y axis only: each is the smallest such box, headed like
             the object's x axis, around the object's own oriented box.

@@ -6,7 +6,7 @@
     training/image_03/0003/000012.png    training/calib/0003.txt
     training/velodyne/0003/000012.bin    training/oxts/0003.txt
     training/evaluate_tracking.seqmap.training   all sequences, with their number of frames
-    training/evaluate_tracking.seqmap.train      those of one split: also val, test
+    training/evaluate_tracking.seqmap.train      sequences of a split; also val, test
 
 A frame is an instant at which camera 02 reads, numbered without gaps: after a frame that is
 missing, another sequence starts, numbered behind all views. Labels have 17 columns,

@@ -73,9 +73,9 @@ DISTORTION = {
     "brown_conrady": "rational_polynomial",
     "kannala_brandt": "kannala_brandt",
 }
-"""Foxglove's distortion models, whose coefficients are in OpenCV's order, by ours."""
+"""Foxglove's distortion model by lens model; its coefficients are in OpenCV's order."""
 FORMATS = {"png": "png", "jpeg": "jpeg", "webp": "webp", "webp_lossless": "webp"}
-"""Foxglove's names of image formats, by ours."""
+"""Foxglove's name by image format."""
 BOX_COLOR = {"r": 0.2, "g": 0.9, "b": 0.4, "a": 0.35}
 LINE_COLOR = {"r": 0.2, "g": 0.9, "b": 0.4, "a": 1.0}
 LINE_PX = 2.0

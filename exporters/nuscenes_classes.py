@@ -32,7 +32,7 @@ class Classes:
     Attributes:
         categories: Name and description by index.
         attributes: Description by name.
-        things: Category by our ``category`` or ``category/subcategory``.
+        things: nuScenes category by ``category`` or ``category/subcategory``.
         surfaces: Category by surface.
         challenge: Categories of each class of the lidarseg challenge, from class 1.
     """
@@ -68,7 +68,7 @@ def category_of(instance: Instance) -> str:
 
 
 def detectable_categories() -> tuple[str, ...]:
-    """Our categories that become moving or movable things, which nuScenes annotates with boxes."""
+    """Our categories that become movable nuScenes objects, which have boxes."""
     named = classes().things.items()
     return tuple(ours for ours, theirs in named if "/" not in ours and theirs[:7] != "static.")
 

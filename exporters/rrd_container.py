@@ -195,5 +195,5 @@ def _unknown(path: Path) -> StorageError:
 
     return StorageError(
         f"{path}: rerun-sdk {version('rerun-sdk')} writes recordings of an unknown structure; "
-        "expected those of rerun-sdk 0.41"
+        "expected the structure of rerun-sdk 0.41"
     )

@@ -51,7 +51,7 @@ FORMAT_VERSION = "1.0.0-preview.1"
 
 PREFIX = "type.unity.com/unity.solo."
 IMAGE_FORMATS = {"png": "Png", "jpeg": "Jpg"}
-"""Unity's names of image formats, by ours."""
+"""Unity's name by image format."""
 BOX2D, BOX3D = "bounding box", "bounding box 3D"
 INSTANCES, LABELS = "instance segmentation", "semantic segmentation"
 TYPES = {

@@ -1,7 +1,7 @@
 """Annotators: exact labels of instances, images and samples, without randomness.
 
 Each annotator is one file and one line in this table; ``annotate`` runs them. Their methods
-determine what they annotate, see ``gen_data.core.interfaces``.
+determine their annotations, see ``gen_data.core.interfaces``.
 """
 
 from gen_data.core.interfaces import (

@@ -28,9 +28,9 @@ PEOPLE = frozenset({"pedestrian", "person"})
 
 Layers = dict[str, NDArray[np.bool_]]
 HEAD_M = 1.9
-"""Things that hang higher leave the floor below them free."""
+"""Objects that hang higher leave the floor below them free."""
 FLAT_M = 0.03
-"""Lower things, such as rugs, are walked on."""
+"""Lower objects, such as rugs, are walked on."""
 
 
 class BevMap(Strict):
@@ -102,9 +102,9 @@ def _street_layers(grid: Grid, scene: Scene, assets: interfaces.AssetLibrary, ow
 
 
 def _room_layers(grid: Grid, scene: Scene, assets: interfaces.AssetLibrary, own: int) -> Layers:
-    """Layers of rooms: an occupancy map, and what walls hold.
+    """Layers of rooms: an occupancy map, and the contents of walls.
 
-    ``occupied`` is covered by furniture and things whose lowest point is below ``HEAD_M``, rugs
+    ``occupied`` is covered by furniture and objects whose lowest point is below ``HEAD_M``, rugs
     left out, or by open doors; ``free_space`` is the rest of the floor, and of doorways.
     """
 
@@ -146,7 +146,7 @@ def _height_m(body: Body, assets: interfaces.AssetLibrary, corner: int) -> float
 def level_pose(pose: se3.SE3) -> se3.SE3:
     """The pose with roll and pitch removed: the X axis keeps its heading.
 
-    Only square roots are used, so that it has the same bits on every processor.
+    Only square roots are used: it has the same bits on every processor.
     """
     ahead = pose.rotate(np.array([1.0, 0.0, 0.0]))
     length = math.sqrt(float(ahead[0]) ** 2 + float(ahead[1]) ** 2)

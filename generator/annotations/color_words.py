@@ -1,8 +1,8 @@
-"""Basic colour words of things, from the true base colours of their surfaces.
+"""Basic colour words of objects, from the true base colours of their surfaces.
 
 A surface has the word of the nearest ISCC-NBS centroid in CIELAB, if that is near and clearly
 nearer than any of another word; colours between basic ones, such as olive green or reddish orange,
-have no word. A thing has the word of nearly all of its surface.
+have no word. An object has the word of nearly all of its surface.
 
 Sources: Berlin and Kay, "Basic Color Terms", 1969 (the eleven words); Kelly and Judd, "Color:
 Universal Language and Dictionary of Names", NBS Special Publication 440, 1976 (centroids: the 22 of
@@ -40,9 +40,9 @@ FARTHEST = 40.0
 CLEARLY = 0.7
 """Largest ratio of the distances from the nearest one and from the nearest of another word."""
 SURFACE = 0.85
-"""Smallest share of a thing's surface that has its word."""
+"""Smallest share of an object's surface that has its word."""
 CLEAR_MAX = 0.1
-"""Metals, and what light goes through, have the colour of something else above this share."""
+"""Metals and transmitting surfaces have the colour of something else above this share."""
 
 
 @lru_cache(maxsize=4096)

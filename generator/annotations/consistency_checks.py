@@ -89,9 +89,9 @@ def _pose_faults(truth: ObjectTruth) -> Iterator[str]:
             if not (all(0 <= side < math.inf for side in box.size_m) and max(box.size_m) > 0):
                 yield f"its {name} has the size {box.size_m} m"
             if not _is_rigid(box.T_frame_box):
-                yield f"its {name} has no rigid pose: {box.T_frame_box}"
+                yield f"its {name} has a pose that is not rigid: {box.T_frame_box}"
     if truth.T_camera_object is not None and not _is_rigid(truth.T_camera_object):
-        yield f"its T_camera_object is no rigid pose: {truth.T_camera_object}"
+        yield f"its T_camera_object is not a rigid pose: {truth.T_camera_object}"
 
 
 def _keypoint_faults(reading: SensorReading, truth: ObjectTruth) -> Iterator[str]:

@@ -21,11 +21,11 @@ RING_PX = 4
 
 
 class Detectability(Strict):
-    """Index d' of the ideal observer of one photograph: near 1 hardly to be told, above 5 plain.
+    """Index d' of the ideal observer of one photograph: near 1 barely detectable, above 5 plain.
 
-    The observer knows the object's expected pixels, and of the background the mean and variance per
-    colour in a ring around the object; it decides which of both the visible pixels show. d'^2 is
-    the sum over them of the squared difference of the means over the mean of both variances
+    The observer is given the object's expected pixels, and of the background the mean and variance
+    per colour in a ring around the object; it decides which of both the visible pixels show. d'^2
+    is the sum over them of the squared difference of the means over the mean of both variances
     (Barrett and Myers, "Foundations of Image Science", 2004, section 13.2.12, for uncorrelated
     noise). Size, contrast, blur, exposure, saturation, the noise of the sensor (EMVA standard 1288)
     and clutter have their effect; colour processing and compression have none. A camera without

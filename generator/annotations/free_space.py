@@ -18,7 +18,7 @@ from gen_data.core.scene import Body, Scene
 from gen_data.roads.carriageway import carriageway
 
 TILE_M = 16.0
-"""Grids are centred on multiples of this, so that the cameras of a rig share one."""
+"""Grids are centred on multiples of this, for the cameras of a rig to share one."""
 CELL_M = 0.1
 ON_IT_M = 0.03
 """Points this near the carriageway's surface are on it: half the rise within a cell of the

@@ -28,7 +28,7 @@ SAMPLED = 16
 RIM = 8
 """Points of a cup's rim that are tested."""
 LEAST_WIDTH_M = 0.001
-"""Thinner things cannot be told from the rounding of a surface."""
+"""A smaller width is within the rounding of a surface."""
 PALM_M = (0.05, 0.03)
 """Length and half height of the part of a gripper that carries the fingers (assumed)."""
 
@@ -219,7 +219,7 @@ def spread_points(mesh: Array, count: int) -> tuple[Array, Array]:
 
 
 def points_near(meshes: Sequence[Array], things: Sequence[Array], margin_m: float) -> list[Array]:
-    """Points on all meshes about ``SPACING_M`` apart, in the bounds and a margin of each thing."""
+    """Points on all meshes about ``SPACING_M`` apart, in each object's bounds plus a margin."""
     low = np.array([thing.min((0, 1)) for thing in things]) - margin_m
     high = np.array([thing.max((0, 1)) for thing in things]) + margin_m
     found = [np.zeros((0, 3))]

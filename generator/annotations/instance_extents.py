@@ -23,7 +23,7 @@ def find_extents(ids: NDArray[np.uint16]) -> dict[int, Extent]:
     """Pixel count and tight box of every id but 0 in an id image, shape [height, width].
 
     The image is first split into horizontal runs of equal ids: the cost of the rest depends on the
-    number of runs (thousands), not on that of pixels or objects.
+    number of runs (thousands), not on the number of pixels or objects.
     """
     height, width = ids.shape
     flat = ids.ravel()

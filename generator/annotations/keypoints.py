@@ -24,8 +24,8 @@ class Keypoints(Strict):
 
     0 = not in the image (or outside the lens's field), 1 = in the image but hidden by other objects
     or by the object itself, 2 = visible. A point up to its radius below the surface of its object
-    counts as visible. The depth is measured along the surface's normal, so that a hub behind the
-    face of its wheel is visible from the side and obliquely alike.
+    counts as visible. The depth is measured along the surface's normal: a hub behind the face of
+    its wheel is visible from the side and obliquely alike.
 
     With a rolling shutter image coordinates refer to the instant of the point's row, camera
     coordinates to the image's instant.

@@ -32,7 +32,7 @@ class Language(base_model.Strict):
     name ("the mug"), only if that is true with every barely visible object, and with similar
     categories (``kin`` in ``grammar.yaml``). An expression is true of one object in the image;
     "leftmost" and "to the left" mean separate boxes, and no other candidate is near enough to be
-    meant. Colours are true base colours (``color_words``), stated only where that of every
+    meant. Colours are true base colours (``color_words``), stated only where the colour of every
     candidate is beyond doubt; "largest" and "smallest" compare true sizes of one category. Objects
     without an expression are named by one of their pixels. Questions about absent objects name
     categories that the template could have placed and the scene does not have.

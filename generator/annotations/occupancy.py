@@ -1,4 +1,4 @@
-"""Occupancy: what is in the voxels of a box around the ego, and what its sensors observe of it.
+"""Occupancy: states of the voxels of a box around the ego, and their observation by its sensors.
 
 Voxels come from the geometry, not from points of a scanner: hidden ones are known, and moving
 objects leave no trails. Readings tell only which voxels a sensor has observed.
@@ -45,7 +45,7 @@ class VoxelOccupancy(Strict):
     in. Air that no return came from is not observed.
 
     Attributes:
-        size_m: Of the box, along the axes of the frame.
+        size_m: Size of the box, along the axes of the frame.
         voxel_m: Side of a voxel.
         from_m: Lowest corner of the box in its frame; null = the box is centred on the frame's
             origin along X and Y, and begins 1 m below it.
@@ -68,7 +68,7 @@ class VoxelOccupancy(Strict):
             count = side_m / self.voxel_m
             if abs(count - round(count)) > 1e-6 * count:
                 raise ValueError(
-                    f"size_m: {side_m:g} m is no multiple of voxel_m, {self.voxel_m:g} m"
+                    f"size_m: {side_m:g} m is not a multiple of voxel_m, {self.voxel_m:g} m"
                 )
         total = math.prod(self.shape)
         if total > VOXELS_MAX:

@@ -23,8 +23,8 @@ class OrientedBoxes2d(Strict):
     Annotators of aerial images draw them so and begin at the front (Xia et al., "DOTA: A
     large-scale dataset for object detection in aerial images", CVPR 2018, section 3). The heading
     is the image of the X axis at the centre of the 3D box; where the axis points at the camera,
-    that of the Y axis decides. The smallest rectangle of all directions, which the exporter
-    ``yolo`` writes, knows no front, and follows the heading of long things only.
+    the Y axis decides. The smallest rectangle of all directions, which the exporter ``yolo``
+    writes, has no front, and follows the heading of long objects only.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})

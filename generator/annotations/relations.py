@@ -26,12 +26,12 @@ from gen_data.core.scene import Body, Instance, Motion, Scene
 from gen_data.core.se3 import SE3, Array
 
 UPWARD = 0.5
-"""A contact carries what is above it if its normal is at most 60 degrees from the vertical: more
+"""A contact carries the upper object if its normal is at most 60 degrees from the vertical: more
 than the friction angle of nearly all materials (assumed)."""
 PLUMB_M = 1e-4
 """Points whose verticals are at most this far apart are over each other."""
 OPPOSITE = -0.5
-"""Fingers hold a thing by contacts whose normals differ by at least 120 degrees."""
+"""Fingers hold an object by contacts whose normals differ by at least 120 degrees."""
 SHELL = frozenset({"floor", "wall", "ceiling"})
 """Categories of the surfaces of rooms: a lamp below a ceiling does not carry it."""
 COMPASS = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(8) * np.pi / 4])
@@ -44,7 +44,7 @@ class Relations(Strict):
     In space, for images between instances that are both visible:
 
     ``supported_by``: the subject's mesh touches the object's from above, at more points than from
-    below. Fixed things are supported by fixed things only, which reach lower or end where they
+    below. Fixed objects are supported by fixed objects only, which reach lower or end where they
     begin; floors, walls and ceilings by nothing.
     ``inside``: the centre of the subject's box and most of its surface are in the convex hull of
     the object, which has walls in eight horizontal directions around that centre.
@@ -56,14 +56,14 @@ class Relations(Strict):
     In images, between annotated instances, as the viewer sees them; their inverses ``right_of`` and
     ``behind`` follow from them:
 
-    ``left_of``: the box of visible pixels ends before that of the object begins.
+    ``left_of``: the box of visible pixels ends before the object's begins.
     ``in_front_of``: the boxes share columns of the image, and the subject's mesh ends before the
     object's begins, along the horizontal direction away from the viewer.
 
     Attributes:
-        contact_m: Meshes at most this far apart touch; also deepest overlap. Resting things
+        contact_m: Meshes at most this far apart touch; also deepest overlap. Resting objects
             of shipped scenes were within 1.1 mm; physics collides convex parts.
-        near: Largest distance of near things, as share of the longest side of the smaller one.
+        near: Largest distance of near objects, as share of the longest side of the smaller one.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
@@ -87,7 +87,7 @@ class Relations(Strict):
     def annotate_frame(
         self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
     ) -> EgoTruth:
-        """Fill in ``relations``: those in space."""
+        """Fill in ``relations`` in space."""
         return replace(truth, relations=_ordered(self._in_space(scenes[""], assets)))
 
     def _in_space(self, scene: Scene, assets: AssetLibrary) -> tuple[Relation, ...]:
@@ -102,7 +102,7 @@ class Thing:
         instance_id: Its id.
         annotated: Whether it is annotated.
         pieces: Mesh, pose and scale of its bodies.
-        motion: ``dynamic`` if any of its bodies is, else that of its first body.
+        motion: ``dynamic`` if any of its bodies is, else the motion of its first body.
         box: Pose and corners of its box.
         robot: Whether it is a robot.
         shell: Whether it is a surface of a room.
@@ -118,7 +118,7 @@ class Thing:
 
 
 class Shape:
-    """The geometry of one thing in the world, computed when it is needed."""
+    """The geometry of one object in the world, computed when it is needed."""
 
     def __init__(self, thing: Thing, assets: AssetLibrary) -> None:
         self.thing = thing
@@ -151,7 +151,7 @@ class Shape:
 
     @cached_property
     def heights_m(self) -> tuple[float, float]:
-        """The lowest and the highest point; boxes of tilted things reach farther."""
+        """The lowest and the highest point; boxes of tilted objects reach farther."""
         z_m = self.triangles_m[..., 2]
         return float(z_m.min()), float(z_m.max())
 
@@ -227,7 +227,7 @@ def _relate(
 
 
 def _relate_pair(one: Shape, other: Shape, contact_m: float, near_m: float) -> Iterator[Relation]:
-    """Relations in space of two things, in both directions."""
+    """Relations in space of two objects, in both directions."""
     contacts = find_contacts(one.triangles_m, other.triangles_m, contact_m)
     close = False
     for a, b, touching in ((one, other, contacts), (other, one, contacts.inverse())):
@@ -260,7 +260,7 @@ def _relate_pair(one: Shape, other: Shape, contact_m: float, near_m: float) -> I
 
 
 def _may_carry(below: Shape, above: Shape, contact_m: float) -> bool:
-    """Whether one thing may support another; fixed things that stand side by side do not."""
+    """Whether one object may support another; fixed objects that stand side by side do not."""
     if above.thing.motion == "dynamic":
         return True
     if above.thing.shell or below.thing.motion == "dynamic":
@@ -270,10 +270,10 @@ def _may_carry(below: Shape, above: Shape, contact_m: float) -> bool:
 
 
 def _lies_over(above: Shape, below: Shape, contacts: Contacts, contact_m: float) -> bool:
-    """Whether one thing meets another from above: where they touch, the one is over the other.
+    """Whether one object meets another from above: where they touch, the one is over the other.
 
     Edges that pass each other at a distance have a slanted normal, too, and carry nothing. The
-    contacts are those of the upper thing with the lower one.
+    contacts are from the upper object to the lower one.
     """
     up = contacts.normals[:, 2] >= UPWARD
     upper_m, gaps_m = contacts.points_m[up], contacts.gaps_m[up, None]

@@ -48,7 +48,7 @@ MAY_BE_NAN = frozenset(
 )
 
 Fault = tuple[str, str]
-"""Field, and what is wrong with it."""
+"""Field, and its fault."""
 
 
 def check_sample(info: DatasetInfo, sample: Sample) -> None:
@@ -217,7 +217,7 @@ def _identity_faults(
         named = info.categories[number - 1]
         yield "category_id", f"{number} is '{named}', but its category is '{instance.category}'"
     if not instance.annotated:
-        yield "instance", "is annotated, although the scene says that it is not"
+        yield "instance", "is annotated, although its instance is not"
 
 
 def _count_ids(ids: NDArray[np.uint16]) -> NDArray[np.intp]:
@@ -265,7 +265,7 @@ def _object_faults(reading: SensorReading, truth: ImageTruth, item: ObjectTruth)
     yield from _space_faults(truth, item)
     names = tuple(k.name for k in item.instance.keypoints)
     if item.keypoints is not None and tuple(k.name for k in item.keypoints) != names:
-        yield "keypoints", f"are not those of the instance: {names}"
+        yield "keypoints", f"are not the instance's: {names}"
 
 
 def _amodal_faults(item: ObjectTruth, width_px: int, height_px: int) -> Iterator[Fault]:
@@ -317,7 +317,7 @@ def _share_faults(item: ObjectTruth) -> Iterator[Fault]:
         if share is not None and not 0.0 <= share <= 1.0:
             yield name, f"{share} is not in [0, 1]"
     if item.detectability is not None and not 0.0 <= item.detectability < math.inf:
-        yield "detectability", f"{item.detectability} is no number from 0"
+        yield "detectability", f"{item.detectability} is not a number from 0"
     if item.visible_fraction is not None and (item.visible_fraction > 0) != (item.visible_px > 0):
         yield "visible_fraction", f"{item.visible_fraction} with {item.visible_px} visible pixels"
     for name, count in (item.part_px or {}).items():
@@ -336,13 +336,13 @@ def _space_faults(truth: ImageTruth, item: ObjectTruth) -> Iterator[Fault]:
         seen = T_world_camera @ item.box3d_camera.T_frame_box
         pairs.append(("box3d_camera", seen, item.box3d_world.T_frame_box))
         if item.box3d_camera.size_m != item.box3d_world.size_m:
-            yield "box3d_camera", f"its size is not that of box3d_world: {item.box3d_camera.size_m}"
+            yield "box3d_camera", f"its size differs from box3d_world: {item.box3d_camera.size_m}"
     if item.T_camera_object is not None:
         placed = T_world_camera @ item.T_camera_object
         pairs.append(("T_camera_object", placed, item.instance.T_world_instance))
     for name, box in (("box3d_world", item.box3d_world), ("box3d_camera", item.box3d_camera)):
         if box is not None and not _is_box(box):
-            yield name, f"is no box: {box}"
+            yield name, f"is not a box: {box}"
     for name, one, other in pairs:
         if not _are_equal(one, other):
             yield name, "contradicts the pose of the instance in the world"
@@ -431,4 +431,4 @@ def _frame_faults(sample: Sample, frame: EgoTruth) -> Iterator[Fault]:
             if number not in known:
                 yield field, "there is no such annotated instance"
             elif not _is_box(box):
-                yield field, f"is no box: {box}"
+                yield field, f"is not a box: {box}"

@@ -43,11 +43,11 @@ class SightLines:
 def trace_sight_lines(
     scene: Scene, lines: Sequence[SightLines], renderer: Renderer
 ) -> list[tuple[NDArray[np.uint8], NDArray[np.uint16]]]:
-    """State of each point, one of the first three of ``TRACK_STATES``, and what hides it.
+    """State of each point, one of the first three of ``TRACK_STATES``, and the id of its occluder.
 
     Args:
         scene: At the instant of the readings.
-        lines: Of each sensor; no ray has a length of 0. All are traced at once.
+        lines: Sight lines of each sensor; no ray has a length of 0. All are traced at once.
         renderer: Traces them.
 
     Returns:

@@ -166,7 +166,7 @@ def meet_along(points_m: Array, direction: Array, triangles: Array, length_m: fl
 
 
 def _reaching(triangles: Array, others: Array, limit_m: float) -> NDArray[np.bool_]:
-    """Whether the bounds of triangles come as near as a limit to those of a mesh, bool [n]."""
+    """Whether the bounds of triangles come as near as a limit to a mesh's bounds, bool [n]."""
     corners = others.reshape(-1, 3)
     return _overlap(triangles.min(1), triangles.max(1), corners.min(0), corners.max(0), limit_m)
 
@@ -195,7 +195,7 @@ def _overlap(
 
 
 def _distances(a: Array, b: Array) -> Array:
-    """Distance of each pair of triangles [m], [n]; of crossing ones, that of their features."""
+    """Distance of each pair of triangles [m], [n]; if they cross, of their features."""
     n_a, n_b = triangle_normals(a), triangle_normals(b)
     best = np.full(len(a), np.inf)
     for k in range(3):

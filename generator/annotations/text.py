@@ -33,7 +33,7 @@ MODULE_PX = 2.0
 GRID = 5
 """Points per side of a character at which its visibility is decided."""
 NEAR_M, NEAR_SHARE = 0.003, 0.001
-"""What is nearer than the text by more hides it: this, and this share of the distance."""
+"""Surfaces nearer than the text by more hide it: this, and this share of the distance."""
 MARGIN_PX = 64.0
 """Lines this far outside the image are looked at more closely."""
 _PLACES = 1024
@@ -43,8 +43,8 @@ _PLACES = 1024
 class Text(Strict):
     """Lines of text in the image: number plates, signs, labels, covers, posters, words on roads.
 
-    For every line, word and character: the quad of its ink, projected through the lens, also behind
-    what hides it; content, language, visibility, and size in pixels. Lines without a visible
+    For every line, word and character: the quad of its ink, projected through the lens, also where
+    hidden; content, language, visibility, and size in pixels. Lines without a visible
     character of the least height are left out. Text that is seen from behind or mirrored has a
     visibility of 0; text in mirrors and behind panes of glass counts as hidden.
 
@@ -226,7 +226,7 @@ class _View:
 def _project(
     scene: Scene, assets: AssetLibrary, reading: SensorReading, lines: list[_Line]
 ) -> _View:
-    """Project the quads of lines, and find what is visible of each."""
+    """Project the quads of lines, and find the visible part of each."""
     counts = [line.count for line in lines]
     body = np.repeat([line.body for line in lines], counts)
     parts = [(line.written, line.rows) for line in lines]

@@ -22,7 +22,7 @@ from gen_data.core.surface_points import SurfacePoints, find_surface_points
 INSTANTS = 3
 """Steps of a sequence at which points are chosen, evenly spread from the first to the last."""
 CANDIDATES = 16
-"""Rays per point: those that hit nothing or glass find none."""
+"""Rays per point: a ray that hits nothing or glass finds no point."""
 FAR_M = 2000.0
 OUTSIDE, BEHIND = TRACK_STATES.index("outside"), TRACK_STATES.index("behind")
 

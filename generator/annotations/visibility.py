@@ -16,7 +16,7 @@ class Visibility(Strict):
     """Three shares in [0, 1], all ratios of pixel counts.
 
     ``visible_fraction`` is BOP's ``visib_fract``: it refers to the silhouette inside and outside
-    the image, so that a truncated object is below 1 even without occlusion (Hodan et al., "BOP
+    the image, which keeps a truncated object below 1 even without occlusion (Hodan et al., "BOP
     Challenge 2020", section 2). An instance without a silhouette is fully truncated.
     """
 

@@ -1,4 +1,4 @@
-"""Voxels of bodies: where their surfaces are, and what these enclose."""
+"""Voxels of bodies: their surfaces, and the space that these enclose."""
 
 import math
 from collections.abc import Sequence
@@ -78,7 +78,7 @@ def _radius_m(asset: str, assets: interfaces.AssetLibrary) -> float:
 def sample_body(
     body: Body, T_frame_body: SE3, box: VoxelBox, assets: interfaces.AssetLibrary
 ) -> BodySamples | None:
-    """Samples of a body; None if its bounds are beside the box."""
+    """Samples of a body; None if its bounds are outside the box."""
     low_m, high_m = assets.bounds_m(body.asset)
     if not box.may_contain(T_frame_body, low_m, high_m, body.scale):
         return None
@@ -119,7 +119,7 @@ def _tiles_in(
 def _sample_tile(
     asset: str, pitch_m: float, tile: tuple[int, int], assets: interfaces.AssetLibrary
 ) -> PointBlocks:
-    """Samples of the surface of an asset in a column of its own frame."""
+    """Samples of the surface of an asset in a column of the asset's frame."""
     mesh = assets.mesh(asset)
     corners = mesh.vertices_m.astype(np.float64)[mesh.faces]
     side_m = TILE_SAMPLES * pitch_m

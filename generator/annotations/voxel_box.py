@@ -17,7 +17,7 @@ the rounding of 32-bit numbers."""
 def turned(row: Sequence[Array] | Array, xyz: Sequence[Array] | Array) -> Array:
     """Coordinate of vectors [3, n] along a row of a rotation, [n].
 
-    In the order in which NumPy's ``einsum`` adds, so that bytes are the same as with ``SE3``.
+    In the order in which NumPy's ``einsum`` adds, for the same bytes as with ``SE3``.
     """
     return np.asarray((row[0] * xyz[0] + row[2] * xyz[2]) + row[1] * xyz[1])
 
@@ -96,7 +96,7 @@ class VoxelBox:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class VoxelMap:
-    """Map from coordinates of points [m] to those in a box, in voxels from its lowest corner.
+    """Map from coordinates of points [m] to coordinates in a box, in voxels from its lowest corner.
 
     Attributes:
         rows: Linear part, float32 [3, 3, 1].

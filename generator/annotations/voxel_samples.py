@@ -53,7 +53,7 @@ def thin_out(points_m: Array, kinds: NDArray[np.integer], cell_m: float) -> Rows
 def split_long(corners_m: Array, side_m: float, low_m: Array, high_m: Array) -> tuple[Array, Rows]:
     """Pieces of triangles that may reach into a box, [m, 3, 3], and the triangle of each, [m].
 
-    Edges are halved until they are no longer than ``side_m``; pieces beside the box are dropped.
+    Edges are halved until they are no longer than ``side_m``; pieces outside the box are dropped.
     """
     owner = np.arange(len(corners_m))
     done: list[tuple[Array, Rows]] = []
@@ -86,7 +86,7 @@ def inside_lattice(
     """Whether lattice points are inside the solids that triangles bound, bool ``shape``.
 
     Point (i, j, k) is at ``PLACE`` in cell (i, j, k) from ``low_m``. It is inside if
-    surfaces above it that face up outnumber those that face down: the winding number of closed
+    surfaces above it that face up outnumber surfaces that face down: the winding number of closed
     surfaces, which may overlap. Columns in which the two do not balance cross an open surface, and
     are outside.
     """
@@ -134,7 +134,7 @@ def is_closed(corners_m: Array) -> bool:
 
 
 def _reach_into(corners: Array, low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
-    """Triangles [n] whose bounds overlap those of a box; a reduction along rows is slower."""
+    """Triangles [n] whose bounds overlap the box's; a reduction along rows is slower."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     above = np.maximum(np.maximum(a, b), c) >= low
     below = np.minimum(np.minimum(a, b), c) <= high

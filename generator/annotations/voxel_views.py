@@ -1,4 +1,4 @@
-"""What cameras and laser scanners observe of a box of voxels."""
+"""Voxels of a box that cameras and laser scanners observe."""
 
 import math
 from collections.abc import Iterator
@@ -16,11 +16,11 @@ Mask = NDArray[np.bool_]
 
 PIXELS_PER_VOXEL = 3.0
 """Pixels along the side of a voxel at the far end of the box: of larger images, every n-th pixel in
-both directions is enough to hit what is visible."""
+both directions is enough to hit the visible voxels."""
 STEPS_PER_VOXEL = 2.0
 """Points along the side of a voxel on lines of a scanner: shorter passes are missed."""
 EDGE_VOXELS = np.float32(1e-3)
-"""What lines keep away from the faces of the box, so that rounding puts no point outside."""
+"""Distance of lines from the faces of the box, which keeps rounded points inside."""
 BATCH = 8_192
 """Points and lines that are handled at once, as fit into the cache of a core."""
 INSTANTS = 33

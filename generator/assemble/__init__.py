@@ -1,1 +1,1 @@
-"""Composition root: a configuration becomes a Pipeline. The one package that knows every table."""
+"""Composition root: a configuration becomes a Pipeline. Only this package imports every table."""

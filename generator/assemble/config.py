@@ -36,7 +36,7 @@ from gen_data.physics import PhysicsConfig
 from gen_data.pipeline.splits import Splits
 
 SHARD_SIZE = 20
-"""Small, so that a crash loses few samples and all workers stay busy."""
+"""Small: a crash loses few samples, and all workers stay busy."""
 
 DEFAULT_RENDERER = "warp"
 
@@ -44,7 +44,7 @@ P = TypeVar("P")
 
 
 RUN_KEYS = frozenset({"skip_failed", "sample_timeout_s"})
-"""Keys that a plan leaves out: options of a run, like those of the command line."""
+"""Keys that a plan leaves out: options of a run, like options of the command line."""
 
 
 class AssetFolders(Strict):
@@ -177,14 +177,14 @@ class Config:
     """A validated configuration; picklable.
 
     Attributes:
-        name: Of the configuration; names the default output folder.
+        name: Name of the configuration, and of the default output folder.
         resolved: The merged document as plain data, as in ``plan.json``; it gives the same Config.
         render: Settings of the renderer.
         exporters: Plug-ins, in order.
         annotations: Annotators by name, in order.
         probes: Configurations of scenes that cover the shared values; one if there are none.
         document: The merged document, the source of configurations of scenes.
-        asset_places: Folders that take the places of the user's, by their names.
+        asset_places: Folders that replace the user's, by their names.
     """
 
     name: str
@@ -199,7 +199,7 @@ class Config:
 
     @property
     def sensors(self) -> tuple[interfaces.Sensor, ...]:
-        """Sensors of the first scene; those of other scenes differ in parameters only."""
+        """Sensors of the first scene; sensors of other scenes differ in parameters only."""
         return self.probes[0].sensors
 
     def plugins(self) -> Iterator[object]:
@@ -482,7 +482,7 @@ def _plugins(
         plugin = known.plugin(key, node, make)
         name = getattr(plugin, tag, None)
         if name is not None and name in names:
-            fact = f"the name '{name}' is taken; expected a name of its own"
+            fact = f"the name '{name}' is taken; expected a unique name"
             if tag == "type":
                 fact = f"the {table.kind} '{name}' is listed twice; expected it once"
             problems.add((node.get(tag) or node).position, f"{key}[{number}].{tag}", fact)

@@ -14,7 +14,7 @@ from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.packs.provision import open_assets
 
 SECTION = "section"
-"""Kind of the mappings of a configuration that are no plug-ins."""
+"""Kind of the mappings of a configuration that are not plug-ins."""
 
 
 def describe_name(name: str) -> str:
@@ -120,7 +120,7 @@ def list_names_of(names: Mapping[str, Iterable[str]]) -> str:
 
 
 def section_names() -> tuple[str, ...]:
-    """Names of the mappings of a configuration that are no plug-ins."""
+    """Names of the mappings of a configuration that are not plug-ins."""
     return tuple(_sections())
 
 

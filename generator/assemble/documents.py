@@ -26,7 +26,7 @@ LISTS = ("randomizers", "sensors", "annotations", "exporters")
 """Lists of plug-ins of a configuration, besides its elements."""
 
 OUTPUTS = ("annotations", "exporters")
-"""Lists of what is computed and written; unlike plug-ins with names, a new one replaces another."""
+"""Lists of computed and written data; unlike plug-ins with names, a new one replaces another."""
 
 NAMED = (*LISTS, "elements", "shared")
 """Sections whose entries have names, by which ``without`` leaves them out."""
@@ -279,9 +279,9 @@ def _load_template(document: Node) -> Node | None:
 
 
 def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
-    """Merge the shared values of a template with those of the configuration, which win.
+    """Merge the shared values of a template with the configuration's, which win.
 
-    The template's come first, so that the configuration's may depend on them.
+    The template's come first: the configuration's may depend on them.
     """
     own, inherited = content.get("shared"), template.get("shared") if template else None
     if inherited is None or (own is not None and not isinstance(own.content, Mapping)):

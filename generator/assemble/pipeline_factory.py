@@ -40,9 +40,9 @@ class PipelineFactory:
 
     Attributes:
         n: Number of samples of the data set, for exporters.
-        extra_channels: Channels to render beyond what sensors and annotators need.
-        known_categories: Categories of a finished data set, if its scenes are used; None = those
-            that the configuration's scenes may contain.
+        extra_channels: Channels to render in addition to the needs of sensors and annotators.
+        known_categories: Categories of a finished data set, if its scenes are used; None = the
+            categories that the configuration's scenes may contain.
     """
 
     config: Config
@@ -70,7 +70,7 @@ class PipelineFactory:
 
     @cached_property
     def renderer(self) -> interfaces.Renderer:
-        """Renderer of this process, which keeps what it has uploaded of the assets.
+        """Renderer of this process, with the assets that it has uploaded.
 
         Raises:
             ConfigError: this machine lacks the device; the message has its place.
@@ -80,7 +80,7 @@ class PipelineFactory:
 
     @cached_property
     def nominal(self) -> tuple[Scene, ...]:
-        """Nominal scenes, one per probe, that cover what a scene can contain.
+        """Nominal scenes, one per probe, that cover all possible contents of a scene.
 
         Raises:
             ConfigError: a randomizer refers to something that neither they nor the assets have.
@@ -91,7 +91,7 @@ class PipelineFactory:
         return scenes
 
     def check(self) -> None:
-        """Refuse what no sample could be generated or exported with, before any engine starts.
+        """Refuse a configuration that cannot give samples or exports, before any engine starts.
 
         Raises:
             ConfigError: a sequence is too long, the physics engine is not installed, cameras form

@@ -1,4 +1,4 @@
-"""Checks of nominal scenes before a run: what would stop it later, or give no labels."""
+"""Checks of nominal scenes before a run, for faults that would stop it later or give no labels."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -20,20 +20,20 @@ from gen_data.scene_templates.carrier import Carrier
 FIDUCIAL = "fiducial"
 """Tag of markers and calibration boards."""
 PAIR_REMEDY = (
-    "mount them on one rig with the same size, field of view, lens and angles, the right one "
-    "beside the left, and vary neither alone by a randomizer"
+    "mount them on one rig with the same size, field of view, lens and angles, the second one "
+    "straight to the right of the first, and vary neither alone by a randomizer"
 )
 
 
 def unrectified_pairs(
     config: SceneConfig, scene: Scene, assets: interfaces.AssetIndex
 ) -> Iterable[errors.ConfigError]:
-    """Pairs of ``stereo_with`` that are no rectified pair in any scene of a configuration.
+    """Pairs of ``stereo_with`` that are not a rectified pair in any scene of a configuration.
 
     Args:
-        config: Of the scene.
+        config: Configuration of the scene.
         scene: The nominal one, with all sensors.
-        assets: Of the scene.
+        assets: Assets of the scene.
     """
     # A randomizer of another package may place cameras without a rig as a pair.
     are_free_ones_known = all(
@@ -50,15 +50,15 @@ def unrectified_pairs(
             fault = _fault_of_pair(here, other)
             if fault:
                 yield errors.ConfigError(
-                    f"sensors.{here.name}.stereo_with: '{here.name}' and '{other.name}' are no "
-                    f"rectified pair: {fault}; {PAIR_REMEDY}"
+                    f"sensors.{here.name}.stereo_with: '{here.name}' and '{other.name}' are not "
+                    f"a rectified pair: {fault}; {PAIR_REMEDY}"
                 )
 
 
 def _fault_of_pair(left: Camera, right: Camera) -> str:
-    """Why two cameras are no rectified pair; empty if they are one."""
+    """Why two cameras are not a rectified pair; empty if they are one."""
     if not left.rig and not right.rig:
-        return "each gets a pose of its own"
+        return "each gets a separate pose"
     try:
         stereo.baseline_m(left, right)
     except ValueError as error:

@@ -1,13 +1,13 @@
 """Cache of computed arrays: on disk by content hash, in memory up to a size.
 
-A disk entry is one file of plain arrays, written atomically, so that any number of processes may
+A disk entry is one file of plain arrays, written atomically: any number of processes may
 share a folder. Unreadable entries are computed again; an unwritable folder only costs time.
 
 A file holds its CRC-32 (of all bytes that follow) and the length of its header, four bytes each,
 little-endian; the header, JSON: key and, per array, name, dtype and shape; the arrays' bytes, each
 padded to a multiple of 64. This is much faster to read than ``.npz``; a scene reads hundreds.
 
-Arrays of large files are views of the mapped file: processes share its pages, and only those that
+Arrays of large files are views of the mapped file: processes share its pages, and only pages that
 are read occupy memory. Entries are replaced or removed, never changed in place.
 """
 
@@ -41,7 +41,7 @@ FORMAT = 3
 # Small, since renderers and physics engines keep their own copies.
 _MEMORY_BYTES = 24 * 1024 * 1024
 _RESULTS = 1024
-"""Kept in memory, a few kilobytes each beside their arrays."""
+"""Results kept in memory, a few kilobytes each in addition to their arrays."""
 _PREFIX = struct.Struct("<II")
 _ALIGNMENT = 64
 # A mapping occupies whole pages, and a process may have 65,530 mappings.
@@ -188,7 +188,7 @@ def _bytes_of(array: NDArray[Any]) -> memoryview:
 def decode_arrays(data: bytes, key: str) -> Arrays | None:
     """Decode the arrays of a cache file; None if they are damaged or have another key.
 
-    Arrays hold numbers only, so that data of any origin can be decoded.
+    Arrays hold numbers only: data of any origin can be decoded.
     """
     if len(data) < _PREFIX.size or not _matches_checksum(memoryview(data)[4:], data[:4]):
         return None
@@ -278,7 +278,7 @@ def _store(path: str, key: str, arrays: Arrays) -> None:
 
 
 def _padding(size: int) -> int:
-    """Number of padding bytes after ``size`` bytes, so that every array starts aligned."""
+    """Number of padding bytes after ``size`` bytes, for every array to start aligned."""
     return -size % _ALIGNMENT
 
 

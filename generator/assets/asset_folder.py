@@ -1,4 +1,4 @@
-"""Files of an asset folder: safe reading, listing, and what follows from their paths.
+"""Files of an asset folder: safe reading, listing, and facts derived from their paths.
 
 All asset files are opened through ``Folder``. Every path is resolved, including symbolic links, and
 must stay inside the folder. Only regular files of bounded size are read. The digest of every file
@@ -172,7 +172,7 @@ _SORTING = re.compile(
     r"materials|assets|obj|stl|ply|dae|glb|gltf|usd|usdz|textured(_\w+)?|nontextured|"
     r"(?=\w*\d)[0-9a-f]{24,40}"
 )
-"""Names of folders that say nothing of what is in them."""
+"""Names of folders that do not describe their contents."""
 
 
 def sanitize_word(text: str) -> str:

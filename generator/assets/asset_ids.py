@@ -1,7 +1,7 @@
 """Asset ids: ``family?key=value&key=value`` or a plain path such as ``pybullet/teddy``.
 
 Values are numbers, comma-separated lists of numbers, or words. The canonical form has sorted keys
-and numbers in their shortest form, so that equal assets have equal ids.
+and numbers in their shortest form: equal assets have equal ids.
 """
 
 import math

@@ -29,7 +29,7 @@ class Finding:
         up: Axis of the file that points up; empty if the file itself states it.
         error: Reason why it cannot be used; empty if it can.
         warnings: Doubtful properties.
-        note: What was measured, for photographs.
+        note: Measurements, for photographs.
     """
 
     asset_id: str
@@ -117,7 +117,7 @@ def _inspect_plate(one: IndexedAsset, library: Library, doubts: tuple[str, ...])
     note = (
         f"horizon from row {left_px:.0f} to row {right_px:.0f} px, camera looks down "
         f"{tilt_deg:.1f} deg and rolls {roll_deg:.1f} deg{source}, hfov {hfov:.1f} deg, "
-        f"room for things {length_m:.1f} m x {width_m:.1f} m"
+        f"room for objects {length_m:.1f} m x {width_m:.1f} m"
     )
     return Finding(one.asset_id, one.kind, "", note=note, warnings=doubts)
 

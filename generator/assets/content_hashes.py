@@ -92,7 +92,7 @@ def _exists(name: str) -> bool:
 def _hash(folder: Folder, file: str) -> list[Any]:
     """Name, state and digest of a file.
 
-    The state is read before the content, so that a later change invalidates the digest.
+    The state is read before the content: a later change invalidates the digest.
     """
     state, now_ns = _state(folder.path(file).stat()), _now_ns()
     if max(state[3:]) > now_ns - _TICK_NS:

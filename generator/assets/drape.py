@@ -278,7 +278,7 @@ def _alone_first(corners: Sequence[Ints], heights: Sequence[Array]) -> tuple[Int
 
     Args:
         corners: Indices of the first, second and third corners, [m] each.
-        heights: Of these corners above the line, [m] each.
+        heights: Heights of these corners above the line, [m] each.
     """
     a, b, c = corners
     above = [height > 0.0 for height in heights]

@@ -63,7 +63,7 @@ def third_party_families() -> Mapping[str, tuple[AnyFamily, str]]:
 
 
 def known_families() -> Mapping[str, AnyFamily]:
-    """Our own families and those of third-party packages, by the first part of ids."""
+    """Built-in and third-party families, by the first part of ids."""
     return {**{n: family for n, (family, _) in third_party_families().items()}, **own_families()}
 
 

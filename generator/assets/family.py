@@ -73,10 +73,10 @@ class Family:
         facts: Pure, quick function of the same arguments; None = no further facts.
         declares: Facts for those who place or change its objects, by name; values, or functions
             and tables as ``Lazy``. Labels do not contain them.
-        symmetries: Likewise: turns that leave the object as it looks; None = there are none.
+        symmetries: The same for turns that leave the object as it looks; None = there are none.
         stored: Whether the disk cache also keeps results that are not offered for selection;
-            false where hardly any is used twice.
-        stored_parameters: Parameters that stored results may have beside a seed, even so.
+            false where few are used twice.
+        stored_parameters: Parameters that stored results may nevertheless have besides a seed.
         origin: Source and licence, if not all is ours.
         about: One line on its objects; empty = first line of the docstring of ``build``.
     """
@@ -106,7 +106,7 @@ class ImageFamily:
     Attributes:
         variants: Seeds ``range(variants)`` are offered for selection; any other seed works too.
         stored: Whether the disk cache also keeps images that are not offered for selection;
-            false where hardly any is used twice.
+            false where few are used twice.
         stored_parameters, declares: As of objects.
         origin: Source and licence, if it is not ours.
     """
@@ -156,7 +156,7 @@ class Lazy:
 
 @dataclass(frozen=True)
 class Builder(Lazy):
-    """The function that makes what a family has; if it takes ``rng``, those are its draws.
+    """The builder function of a family; if it takes ``rng``, the family draws by it.
 
     Attributes:
         family: Name of the family; with the seed, it decides all draws.

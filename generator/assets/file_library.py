@@ -1,4 +1,4 @@
-"""Assets from files: pybullet's, those of installed packs, and the user's."""
+"""Assets from files: from pybullet, installed packs and the user's folders."""
 
 import importlib.util
 import math
@@ -47,13 +47,13 @@ PYBULLET = "pybullet"
 _PYBULLET = Path(__file__).with_name("pybullet.yaml")
 _RENDERED = Path(str(content().__file__)).parent / "plates"
 PLATES_VERSION = 2
-"""Changes with what is measured in photographs."""
+"""Changes with the measurements in photographs."""
 
 
 class FileLibrary:
     """Part of the library that is read from folders.
 
-    Ids are those of the indices; ``<robot>/<link>`` is a robot's link, ``<stage>/<piece>`` a
+    Ids come from the indices; ``<robot>/<link>`` is a robot's link, ``<stage>/<piece>`` a
     stage's mesh, and ``<asset>#<image>`` an image that an asset's materials refer to.
     """
 
@@ -139,7 +139,7 @@ class FileLibrary:
         return content_key({"asset": self._key(one), "link": part})
 
     def remarks(self, asset_id: str, *, read: bool) -> tuple[importer.FileRemarks, ...] | None:
-        """What was seen in an asset's files and not used.
+        """Unused contents of an asset's files.
 
         Args:
             asset_id: An asset, also of another kind than an object.
@@ -204,7 +204,7 @@ class FileLibrary:
         )
 
     def _described_remarks(self, one: IndexedAsset) -> tuple[str, ...]:
-        """What a description of links and joints, or a map, has and nothing uses; else empty."""
+        """Unused contents of a description of links and joints, or of a map; else empty."""
         network = self._road_network(one.asset_id)
         if network is not None:
             return (describe_unused(network.unused),) if network.unused else ()
@@ -271,7 +271,7 @@ class FileLibrary:
     def _image(
         self, owner: str, one: IndexedAsset, folder: Folder, name: str, channels: str
     ) -> UInt8:
-        """Pixels of an image, embedded in a mesh file or beside it."""
+        """Pixels of an image, embedded in a mesh file or next to it."""
         has_mesh = one.kind == "object" or owner != one.asset_id
         if has_mesh and name in (images := self.imported(owner).images):
             return images[name]

@@ -17,7 +17,7 @@ def collect_remarks(
 ) -> tuple[FileRemarks, ...]:
     """Remarks on the files of the user's assets among ``asset_ids``, by file.
 
-    Those of assets that were imported before are complete; of the others, at most ``read_max`` are
+    Remarks are complete for assets imported before; of the others, at most ``read_max`` are
     imported. An asset that cannot be used has none: its use reports the fault.
     """
     found: dict[str, list[str]] = {}

@@ -318,7 +318,7 @@ class RobotEntry(Origin):
     tool: ToolEntry | None = None
     """Instead of a gripper in its description."""
     workspace_from_m: Annotated[float, Field(ge=0.0)] = asset_types.WORKSPACE_FROM_M
-    """Horizontal distance from the base to where its workspace on a table begins: the things of
+    """Horizontal distance from the base to where its workspace on a table begins: the objects of
     tasks lie so much nearer or farther."""
     touching: tuple[tuple[str, str], ...] = ()
     """Link pairs in permanent contact, besides neighbours."""
@@ -418,22 +418,22 @@ class PlateEntry(Origin):
     camera_height_m: Length
     """Height of the camera above the ground."""
     ground: Annotated[tuple[PointPx, ...], Field(min_length=3)]
-    """Corners of the ground on which things may stand [px]."""
+    """Corners of the ground on which objects may stand [px]."""
     hfov_deg: Annotated[float, Field(ge=5.0, le=150.0)] | None = None
     """Horizontal field of view; by default from the photograph's EXIF data, else estimated."""
     horizon: LevelHorizon | tuple[PointPx, PointPx] | None = None
     """Two points of the horizon [px], or its height; by default estimated from straight edges."""
     mask: str = ""
-    """Image of the foreground, of the photograph's size: white hides what is inserted."""
+    """Image of the foreground, of the photograph's size: white hides inserted objects."""
     lanes: tuple[PlateLane, ...] = ()
     sun: PlateSunEntry | None = None
     """By default the light comes from the sky alone."""
     ground_albedo: Annotated[float, Field(gt=0.0, le=1.0)] = 0.15
-    """Reflectance of the ground, which sets the brightness of inserted things against it. Asphalt:
+    """Reflectance of the ground, which sets the brightness of inserted objects against it. Asphalt:
     0.04 when new, 0.12 after five years, at most 0.16 (LBNL Heat Island Group, "Pavement albedo");
     other ground 0.2 to 0.4, snow 0.8 (assumed, within a factor of 1.5)."""
     ground_roughness: Fraction = 0.9
-    """Less for ground that mirrors what stands on it."""
+    """Less for ground that mirrors the objects on it."""
     tags: tuple[Word, ...] = ()
 
     def files(self) -> tuple[str, ...]:
@@ -646,7 +646,7 @@ def _is_mjcf(root: Path, file: str) -> bool:
 
 
 def _described_files(root: Path, description: str) -> tuple[str, ...]:
-    """Files that belong to a description, and are no assets themselves."""
+    """Files that belong to a description, and are not assets themselves."""
     try:
         if robot_formats.is_foreign(description):
             # Its own reader starts a process: the names of its files are enough here.

@@ -25,7 +25,7 @@ _WITH_ALPHA = ("RGBA", "LA", "PA")
 
 
 def decode_image(data: bytes, place: str, *, alpha: bool = False) -> asset_types.UInt8:
-    """Decode an image to sRGB, uint8 [height, width, 3], upright as its EXIF orientation says.
+    """Decode an image to sRGB, uint8 [height, width, 3], upright by its EXIF orientation.
 
     Sixteen bits per channel become eight; floating-point values count to 1.
 
@@ -226,7 +226,7 @@ def _split_radiance(
     """Both axes of a Radiance image, slowest first, as (sign and axis, pixels); and its scan lines.
 
     Raises:
-        AssetError: if it is no Radiance image, or of another kind of colours than RGB.
+        AssetError: if it is not a Radiance image, or has other colours than RGB.
     """
     found = _RESOLUTION.search(data[:_MAX_HEADER_BYTES])
     if data[:2] != b"#?" or found is None:

@@ -45,12 +45,12 @@ _DEFAULT_FRONT = {"x": "-z", "y": "x", "z": "x"}
 _PROTRUSION = re.compile("mirror|antenna|aerial", re.IGNORECASE)
 """Names of parts that 3D boxes of vehicles leave out."""
 _MAX_ALBEDO = 0.85
-"""Upper bound on diffuse albedo, that of fresh snow; files often use 1 for white."""
+"""Upper bound on diffuse albedo, the albedo of fresh snow; files often use 1 for white."""
 
 
 @dataclass(frozen=True)
 class FileRemarks:
-    """What was seen in a file and not used, or used otherwise than the file says.
+    """Contents of a file that were not used, or not used as the file states.
 
     Attributes:
         file: Path in the folder.
@@ -73,9 +73,9 @@ class ImportedMesh:
             of the folder, or to several images (``gen_data.assets.texture_maps``).
         keypoints: Named points in the asset's frame.
         body_bounds_m: Bounds of the mesh without a vehicle's exterior mirrors; None if it has none.
-        shift_m: What was added to the coordinates of the file, scaled and turned upright, to reach
+        shift_m: Offset added to the coordinates of the file, scaled and turned upright, to reach
             the asset's origin.
-        remarks: What its files hold and it does not, per file.
+        remarks: Contents of its files that it lacks, per file.
     """
 
     mesh: MeshData | None
@@ -179,7 +179,7 @@ def _drop_transparent(soup: TriangleSoup, place: str) -> tuple[TriangleSoup, tup
 
 
 def _bounds_without_mirrors(soup: TriangleSoup, mesh: MeshData) -> tuple[Vec3, Vec3] | None:
-    """Bounds of all groups but those named like mirrors or antennas, within those of the mesh.
+    """Bounds of all groups except those named like mirrors or antennas, inside the mesh's bounds.
 
     None if no group, or every one, has such a name.
     """
@@ -329,7 +329,7 @@ def _check_placeable(material: Material, finish: Finish, soup: TriangleSoup, pla
 def _split_regions(
     soup: TriangleSoup, regions: Sequence[Region], place: str, owner: str
 ) -> TriangleSoup:
-    """Give the triangles of each region a slot of their own."""
+    """Give the triangles of each region a separate slot."""
     for region in regions:
         centers = soup.corners.mean(axis=1)
         inside = ((centers >= region.low_m) & (centers <= region.high_m)).all(axis=1)
@@ -349,7 +349,7 @@ def _split_regions(
 def _apply_finish(material: Material, finish: Finish, owner: str) -> Material:
     """Override a material with the fields that a finish gives.
 
-    A finish with a colour makes the surface opaque, unless it says otherwise.
+    A finish with a colour makes the surface opaque, unless it states otherwise.
     """
     changes = {k: v for k, v in finish.model_dump(exclude={"maps"}).items() if v is not None}
     maps = finish.maps
@@ -379,7 +379,7 @@ def _limit_white(material: Material) -> Material:
 def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
     """Replace palette images by a colour per slot: the median over its corners' texels.
 
-    The file's own colour wins per channel where it is darker, because exporters write it beside
+    The file's own colour wins per channel where it is darker, because exporters write it next to
     the image.
     """
     slots = []

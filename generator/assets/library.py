@@ -138,7 +138,7 @@ class Library:
         return self._variants[family]
 
     def _hold(self, asset: asset_types.Asset) -> asset_types.Asset:
-        """Keep a description, so that asking for it by its id reads nothing again."""
+        """Keep a description: the next look-up by its id reads nothing."""
         return self._entries.get(asset.asset_id, lambda: asset)
 
     def parameters(
@@ -173,7 +173,7 @@ class Library:
         return body[0] if body else None
 
     def stride_bounds_m(self, asset_id: str) -> Bounds:
-        """Bounds over a whole stride of a person who walks; those of the mesh for all others.
+        """Bounds over a whole stride of a person who walks; bounds of the mesh for all others.
 
         Over its quarters: legs and arms reach at most 5 cm farther between them.
         """
@@ -209,14 +209,14 @@ class Library:
         return () if self._is_generated(asset_id) else self._files.lanes(asset_id)
 
     def remarks(self, asset_id: str, *, read: bool = True) -> tuple[FileRemarks, ...] | None:
-        """What was seen in an asset's files and not used; see ``FileLibrary.remarks``.
+        """Unused contents of an asset's files; see ``FileLibrary.remarks``.
 
         Empty for generated assets.
         """
         return () if self._is_generated(asset_id) else self._files.remarks(asset_id, read=read)
 
     def file_shift_m(self, asset_id: str) -> se3.Vec3 | None:
-        """What was added to the coordinates of a user's file, scaled and upright, on import [m].
+        """Offset added to the coordinates of a user's file, scaled and upright, on import [m].
 
         None for assets that are not of a user's folder.
         """
@@ -303,7 +303,7 @@ class Library:
     def derived(self, asset_id: str, name: str, compute: Callable[[], Arrays]) -> Arrays:
         """Arrays computed from an asset alone; see ``DerivedArrays``.
 
-        Those of assets that are not on disk themselves are not stored: their number is unlimited.
+        Arrays of assets that are not stored on disk are not stored: their number is unlimited.
         """
         owner = asset_id.partition("#")[0]
         if self._is_generated(owner) and not self._generated.is_stored(parse_asset_id(owner)):
@@ -315,9 +315,9 @@ class Library:
         return content_key({"asset": self.get(owner).sha256, "id": asset_id, "derived": name})
 
     def _bounds(self, asset_id: str) -> tuple[Bounds, ...]:
-        """Bounds of the mesh and, if there are any, those of the body.
+        """Bounds of the mesh and, if there are any, of the body.
 
-        Known or stored beside the mesh: of the things that a scene tries to place, half find no
+        Known or stored next to the mesh: half of the objects that a scene tries to place find no
         place, and their meshes need not be made or read.
         """
 
@@ -373,7 +373,7 @@ class Library:
         raise UnknownAsset(f"asset '{asset_id[:120]}': {self._nearest(asset_id[:120])}", asset_id)
 
     def _nearest(self, asset_id: str) -> str:
-        """Suggestions for an unknown id: its pack, similar ids, or what the user's folders hold."""
+        """Suggestions for an unknown id: its pack, similar ids, or the user's folders' contents."""
         if self._files.is_missing(asset_id):
             return "comes with pybullet, which is not here; run: gen-data assets install pybullet"
         known = [*self._generated.names(), *self._files.names()]

@@ -26,7 +26,7 @@ _ROOT = robot_description.FORMAT_ROOTS[0]
 _SHOWN_GROUPS = 3
 """MuJoCo's viewer shows the groups 0 to 2."""
 _PLAIN = (0.5, 0.5, 0.5, 1.0)
-"""Colour of geoms that state none; only another one overrides that of a material."""
+"""Colour of geoms that state none; only another colour overrides a material's."""
 
 
 def read_mjcf(folder: asset_folder.Folder, relative: str) -> robot_description.RobotDescription:
@@ -100,7 +100,7 @@ class _File:
 
 @dataclass(frozen=True)
 class _Source:
-    """What is taken out of a description before MuJoCo compiles it."""
+    """Content taken out of a description before MuJoCo compiles it."""
 
     folder: asset_folder.Folder
     relative: str
@@ -116,7 +116,7 @@ class _Source:
 
 
 def _strip_files(spec: Any, mujoco: Any) -> tuple[Any, ...]:
-    """Replace meshes by boxes and remove images; return what they were."""
+    """Replace meshes by boxes and remove images; return these meshes and images."""
     remarks: Counter[str] = Counter()
     meshes = _strip_meshes(spec, mujoco)
     images, colors = _strip_images(spec, mujoco, remarks)

@@ -2,7 +2,7 @@
 
 Metres, Z up, counter-clockwise outward; vertices are welded, then split at creases and UV seams
 only; degenerate and duplicate triangles are removed. All steps are stable sorts and plain
-arithmetic, so that a file yields the same bytes on every processor.
+arithmetic: a file yields the same bytes on every processor.
 """
 
 import math
@@ -218,7 +218,7 @@ def signed_volume(corners: Float64) -> float:
 
 
 def _winding_flips(face_count: int, edges: _Edges) -> Bools:
-    """Mask [m] of the faces to flip so that neighbours agree; the majority of a piece stays."""
+    """Mask [m] of the faces to flip for neighbours to agree; the majority of a piece stays."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -261,7 +261,7 @@ def _valid_normals(soup: TriangleSoup) -> Float64 | None:
 def _crease_normals(soup: TriangleSoup, faces: Int64, crease_deg: float) -> Float64:
     """Unit normals [m, 3, 3], smooth within pieces of the surface bounded by creases.
 
-    Corners are weighted by area and angle ("weighted normals"): large flat faces stay flat beside
+    Corners are weighted by area and angle ("weighted normals"): large flat faces stay flat next to
     narrow bevels, and the diagonal of a quad does not matter.
     """
     from scipy.sparse import coo_array

@@ -67,7 +67,7 @@ def parse_road_network(root: Path, digests: Digests, file: str) -> Arrays:
 
 
 def parse_lanes(root: Path, digests: Digests, file: str) -> Arrays:
-    """Read the lanes of a road network, and what it leaves out, for ``unpack_value``."""
+    """Read the lanes of a road network, and its unused contents, for ``unpack_value``."""
     folder = Folder(root)
     return _checked(folder, digests, _pack_value(importer.road_network_content(folder, file)))
 

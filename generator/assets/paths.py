@@ -28,7 +28,7 @@ def may_fetch() -> bool:
 
 @contextmanager
 def offline() -> Iterator[None]:
-    """Fetch nothing in the block, in this process and those that it starts."""
+    """Fetch nothing in the block, in this process and its children."""
     before = os.environ.get(OFFLINE)
     os.environ[OFFLINE] = "1"
     try:

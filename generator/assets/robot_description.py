@@ -1,4 +1,4 @@
-"""Links, joints and geometry of a robot or another thing with joints, whatever file describes it.
+"""Links, joints and geometry of a robot or another jointed object, whatever file describes it.
 
 Readers: ``urdf``, ``mjcf``, ``sdf``.
 """
@@ -94,7 +94,7 @@ class RobotDescription:
         joints: In the order of their child links.
         home: Positions [rad or m] by joint that the file itself proposes.
         included: Further files of the description, relative to the folder.
-        remarks: What the file has and nothing here uses, for the user.
+        remarks: Unused contents of the file, for the user.
     """
 
     links: dict[str, Link]

@@ -14,7 +14,7 @@ _NAME = re.compile(rb"<name>\s*([\w.-]+)\s*</name>")
 def resolve_uri(folder: Folder, relative: str, uri: str) -> str:
     """Resolve ``package://x/y``, ``model://x/y`` or a relative path to a file below the folder.
 
-    A package is the folder of that name beside or above the file ``relative``, or the one above it
+    A package is the folder of that name next to or above the file ``relative``, or the one above it
     whose ``package.xml`` has that name. Older descriptions omit the package's name, so the path is
     also tried unchanged, and names of folders above the file may precede it.
 

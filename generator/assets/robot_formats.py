@@ -1,4 +1,4 @@
-"""Formats of descriptions of robots and other things with joints, by suffix."""
+"""Formats of descriptions of robots and other jointed objects, by suffix."""
 
 from collections.abc import Callable
 from pathlib import PurePosixPath

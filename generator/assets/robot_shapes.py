@@ -17,7 +17,7 @@ def read_shape(
 ) -> mesh_source.MeshSource:
     """Read or make the triangles of a shape, in the root frame and its colour.
 
-    The name of an image inside a mesh file is preceded by that of the file.
+    The name of an image inside a mesh file is preceded by the name of the file.
 
     Raises:
         AssetError: if its mesh is unusable.

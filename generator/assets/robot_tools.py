@@ -1,7 +1,7 @@
 """Tools made by code for arms whose description ends at the flange: fingers, or a suction cup.
 
 A tool is a few links of boxes and cylinders, joined to the flange; the arm with its tool is read
-from then on like any other robot. Its frame is that of the flange, with Z out of the arm.
+from then on like any other robot. Its frame is the flange's, with Z out of the arm.
 """
 
 import math
@@ -18,12 +18,12 @@ VERSION = 2
 BASE = "tool"
 FINGERS = ("tool_left_finger", "tool_right_finger")
 STROKE_M = 0.084
-"""Of the fingers, like that of a Panda's hand (0.08) or a Robotiq 2F-85 (0.085)."""
+"""Stroke of the fingers, like a Panda hand's (0.08) or a Robotiq 2F-85's (0.085)."""
 VACUUM_PA = 60_000.0
 """Below the pressure of the air: usual for airtight surfaces (assumed)."""
 
 _PALM_M: Vec3 = (0.06, 0.11, 0.05)
-"""So short that a camera beside it sees the fingers."""
+"""Short enough for a camera next to it to see the fingers."""
 _FINGER_M: Vec3 = (0.02, 0.014, 0.09)
 _TIP_M = 0.009
 """The finger tips are this far beyond the grasp frame's origin."""
@@ -94,7 +94,7 @@ def _with_own_root(hand: RobotDescription) -> tuple[list[Link], list[Joint]]:
 
 
 def tool_gripper(tool: ToolEntry) -> Gripper:
-    """How a tool holds things."""
+    """The gripper of a tool."""
     if tool.kind == "suction":
         tip = SE3((0.0, 0.0, _TUBE_M + _LIP_M))
         # Difference of pressures times the area within the rim.

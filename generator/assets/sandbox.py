@@ -1,4 +1,4 @@
-"""Parsing of foreign files in a child process with limits, so that a hostile file harms nothing.
+"""Parsing of foreign files in a child process with limits: a hostile file harms nothing.
 
 Parsers of meshes, images and stages partly consist of native code. In a child of bounded memory and
 processor time, without rights to write or to connect, a crash or an endless loop ends in one error.

@@ -80,8 +80,8 @@ class _Scope:
 
     Attributes:
         file: Its file.
-        prefix: Of the names of its parts.
-        frame: Name of its own frame, ``__model__`` inside it.
+        prefix: Prefix of the names of its parts.
+        frame: Name of the model's frame, ``__model__`` inside it.
         depth: Files and models around it, and itself.
         lenient: Whether its version, below 1.7, lets parts of two kinds have one name.
     """
@@ -93,7 +93,7 @@ class _Scope:
     lenient: bool
 
     def named(self, name: str) -> str:
-        """Name among all parts of what this model calls ``name``."""
+        """Global name of the part that this model calls ``name``."""
         return self.frame if name == _MODEL else self.prefix + name
 
 
@@ -431,7 +431,7 @@ class _Reader:
         raise ValueError(f"there is no link or frame '{name[:60]}'")
 
     def _at(self, name: str, base: str = _MODEL) -> SE3:
-        """Pose of a frame in that of the root, or in ``base`` around it."""
+        """Pose of a frame in the root frame, or in ``base`` around it."""
         pose = SE3()
         for _ in range(len(self.frames) + 1):
             if name in ("", base):

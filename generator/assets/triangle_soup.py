@@ -27,7 +27,7 @@ class MaterialSlot:
         name: Its name in the file; empty = unnamed.
         from_file: Whether the mesh file itself defines the material; otherwise a file that refers
             to the mesh may define it.
-        declared_color: Linear RGB that the file gives beside an image, where it has no effect.
+        declared_color: Linear RGB that the file gives next to an image, where it has no effect.
         missing: Why a material that the file names is not defined; empty = it is.
     """
 
@@ -182,7 +182,7 @@ def first_occurrences(keys: Int64) -> tuple[Int64, Int64]:
 
 
 def _pack_columns(keys: Int64) -> list[Int64]:
-    """Columns [n] that tell the same rows apart as those of ``keys``, as few as 63 bits allow."""
+    """Columns [n] that distinguish the same rows as ``keys``, as few as 63 bits allow."""
     packed, room = list[Int64](), 0
     for column in keys.T:
         low = int(column.min(initial=0))

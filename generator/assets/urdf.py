@@ -1,6 +1,6 @@
 """URDF reader: links, joints and geometry.
 
-Source: ROS wiki, urdf/XML. Document type declarations are refused, so that no entity is ever
+Source: ROS wiki, urdf/XML. Document type declarations are refused: no entity is ever
 expanded. Inertia is not used: arms move as planned, and masses of objects have their own field.
 """
 

@@ -49,7 +49,7 @@ def stage_model(folder: asset_folder.Folder, entry: MeshEntry, asset_id: str) ->
 def _transform_light(light: scene.Light, T_model_stage: se3.SE3, scale: float) -> scene.Light:
     """Transform a light to the model's frame.
 
-    Intensity grows with the square of the scale, so that the illuminance of the scaled scene stays.
+    Intensity grows with the square of the scale, which keeps the illuminance of the scaled scene.
     """
     place = _scale_translation(T_model_stage @ se3.SE3(light.position_m), scale)
     return replace(

@@ -1,7 +1,7 @@
 """Colours of vertices and faces, expressed by materials and images, which renderers interpolate.
 
 A material whose corners all have one colour takes it as its base colour, a few colours of whole
-faces become materials of their own, and gradients an image with a small cell per triangle.
+faces become separate materials, and gradients an image with a small cell per triangle.
 """
 
 from dataclasses import dataclass, replace
@@ -167,7 +167,7 @@ def _cells(centers: Float64) -> tuple[Int64, Int64]:
 
 
 def _interleave(axes: tuple[Int64, ...]) -> Int64:
-    """Numbers whose bits are those of all axes in turn, the first axis lowest."""
+    """Numbers made of the bits of all axes in turn, the first axis lowest."""
     code = np.zeros_like(axes[0])
     for bit in range(_BITS):
         for k, values in enumerate(axes):

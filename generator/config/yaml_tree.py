@@ -39,7 +39,8 @@ MAX_STRING_BYTES = 4096
 
 _TOO_DEEP = f"nested deeper than {MAX_DEPTH} levels"
 _LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
-"""What libyaml says from version 0.2.6 on of 1,000 open brackets, before it returns the first."""
+"""libyaml's message, from version 0.2.6 on, for 1,000 open brackets, before it returns the
+first."""
 
 ORIGIN = "--set"
 """Name of overrides in messages, in place of a file."""
@@ -59,9 +60,9 @@ class Node:
     """A value in a document.
 
     Attributes:
-        position: Of its first character.
+        position: Position of its first character.
         content: A scalar, a tuple of nodes (a list), or a dictionary of nodes (a mapping).
-        key_positions: Of the keys of a mapping.
+        key_positions: Positions of a mapping's keys.
         text: The scalar as written, without quotes.
     """
 
@@ -122,17 +123,17 @@ def load_yaml(path: Path) -> Node:
     """Read the mapping in a YAML file.
 
     Raises:
-        ConfigError: the file cannot be read, or is no valid document.
+        ConfigError: the file cannot be read, or is not a valid document.
     """
     try:
         if path.exists() and not path.is_file():
-            raise ConfigError(f"{path}: is no regular file")
+            raise ConfigError(f"{path}: is not a regular file")
         with path.open("rb") as file:
             data = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError:
-        raise ConfigError(f"{str(path)!r}: is no file name") from None
+        raise ConfigError(f"{str(path)!r}: is not a file name") from None
     # Pages and tests read the same templates again and again.
     name = f"{path}:{blake2b(data).hexdigest()}"
     return _LOADED.get(name, lambda: parse_yaml(_decode(data, str(path)), str(path)))
@@ -146,7 +147,7 @@ def parse_yaml(text: str, file: str) -> Node:
     """Parse the mapping in a YAML text; ``file`` is its name in messages.
 
     Raises:
-        ConfigError: the text is no valid document; the message lists all independent errors.
+        ConfigError: the text is not a valid document; the message lists all independent errors.
     """
     # A byte order mark is legal at the start of a document, and has no meaning in UTF-8.
     node = _Reader(text.removeprefix("\ufeff"), file).read()
@@ -179,7 +180,7 @@ def with_override(node: Node, path: str, value: str) -> Node:
         value: YAML, usually a scalar or a flow collection.
 
     Raises:
-        ConfigError: the path does not exist, or the value is no valid YAML.
+        ConfigError: the path does not exist, or the value is not valid YAML.
     """
     steps = _parse_path(path, value)
     within = tuple(part for part, _ in steps)
@@ -238,7 +239,7 @@ class _Reader:
             self._abort(self._at(0, 0), f"not valid YAML: {abbreviate(str(error), 200)}")
 
     def _place_of(self, error: yaml.MarkedYAMLError) -> Position:
-        """Position of a syntax error; of what was left open if the text ended too early."""
+        """Position of a syntax error; of the open collection if the text ended too early."""
         last = max((i for i, line in enumerate(self._lines) if line.strip()), default=0)
         for mark in (error.problem_mark, error.context_mark):
             if mark is not None and mark.line <= last:
@@ -357,7 +358,7 @@ class _Reader:
             self._abort(where, f"alias *{name} has no anchor &{name} before it")
         target = self._anchors[event.anchor]
         if target is None:
-            self._abort(where, f"alias *{name} stands inside what it names")
+            self._abort(where, f"alias *{name} is inside the node it refers to")
         # Aliases of aliases grow exponentially, so what they stand for counts, not their number.
         levels, count = _extent(target)
         self._aliased += count
@@ -423,7 +424,7 @@ def _parse_path(path: str, value: str) -> list[_Step]:
             refuse(
                 Position(ORIGIN, 1, at + 1, source),
                 "",
-                f"'{abbreviate(path)}' is no path; expected something like a.b[0].c",
+                f"'{abbreviate(path)}' is not a path; expected the form a.b[0].c",
             )
         name_at = match.start(2) if match[2] else at
         part: str | int = match[2] if match[2] else int(match[1])

@@ -31,13 +31,13 @@ class Material:
         coat_roughness: Perceptual roughness of the coat in [0, 1].
         transmission: Share in [0, 1] of the light under the specular layer that goes through
             instead of being scattered back; tinted by the base colour.
-        ior: Refractive index of what transmits.
+        ior: Refractive index where light is transmitted.
         thin: Whether a transmitting slot is a pane without refraction; else a solid that refracts.
         opacity: Share in [0, 1] of the background that it hides; labels treat it as solid.
         diffuse_transmission: Albedo of the light that a thin sheet such as a leaf scatters to its
             other side, linear RGB in [0, 1]; multiplies the texture. Renderers reduce it where it
             and the base colour exceed 1 together. Metals have none.
-        printed: The texture is part of what the object *is* (a label, a book cover);
+        printed: The texture is essential to the object (a label, a book cover);
             randomizers leave colour and texture alone. On paint, plates and signs it is on the
             front only: their backs have its mean colour.
         role: Function of the slot on its object, for randomizers that target it:
@@ -220,7 +220,7 @@ class SuctionCup:
     """A vacuum cup, whose rim is a circle about the grasp frame's Z, in its XY plane.
 
     Attributes:
-        radius_m: Of the rim.
+        radius_m: Rim radius.
         force_n: Largest force that it holds; a larger one tears the object off.
     """
 
@@ -230,7 +230,7 @@ class SuctionCup:
 
 @dataclass(frozen=True, slots=True)
 class Gripper:
-    """How a robot holds things.
+    """The hand of a robot.
 
     Attributes:
         link: Link whose frame carries the grasp frame.
@@ -264,7 +264,7 @@ class RobotModel:
         visuals: ``{link: mesh asset id}``; links without geometry are absent.
         collisions: ``{link: asset id whose convex parts collide}``.
         home: A nominal, collision-free position per movable joint, in the order of ``joints``.
-        gripper: Present when the robot can hold things.
+        gripper: Present when the robot can hold objects.
         no_collide: Link pairs that may touch (neighbours, and pairs that touch by design).
         workspace_from_m: Horizontal distance from the base to where its workspace begins.
     """

@@ -6,7 +6,7 @@ from typing import Generic, Protocol, TypeVar
 
 
 class Sized(Protocol):
-    """Something that knows how much memory it holds."""
+    """An object that reports its memory."""
 
     @property
     def nbytes(self) -> int:
@@ -82,8 +82,8 @@ class CountCache(Generic[V]):
 class ObjectCache(Generic[V]):
     """Values made of objects that never change, for the latest of these objects.
 
-    Objects are told apart by identity: asking a scene's thousands of materials for their hashes
-    takes longer than what is kept here. Whatever is kept, the values are the same.
+    Objects are told apart by identity: hashing a scene's thousands of materials takes longer than
+    computing the cached values. Values are the same whether cached or not.
     """
 
     def __init__(self, limit: int) -> None:

@@ -19,8 +19,8 @@ class ImageEncoding:
     """Encoding of image files.
 
     Attributes:
-        format: Of the files.
-        quality: Of jpeg and webp, from 1 to 100; 0 for formats without loss.
+        format: File format.
+        quality: Quality of jpeg and webp, from 1 to 100; 0 for lossless formats.
     """
 
     format: ImageFormat = "png"
@@ -44,7 +44,7 @@ class Channel(str, Enum):
     RGB                   uint8 [h, w, 3]         sRGB: a photograph, which a camera develops from
                                                   RADIANCE; a renderer ends there
     RADIANCE              float32 [h, w, 3]       luminance, linear RGB [cd/m^2]: means over pixels
-    Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf, also beside and
+    Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf, also next to and
                                                   behind the camera, where wide lenses look
     RANGE                 float32 [h, w]          along the ray [m]; inf
     NORMALS               float32 [h, w, 3]       unit, camera frame, towards the camera; 0
@@ -55,7 +55,7 @@ class Channel(str, Enum):
     AMODAL                (silhouettes)           each instance alone, also outside the image
     SIGNAL                (expected signal)       a photograph before its noise; none without RGB
     MEASURED_DEPTH        float32 [h, w]          depth as a device reports it [m]; inf
-    INFRARED              uint16 [h, w]           its image of its own light, in its own units; 0
+    INFRARED              uint16 [h, w]           image of the device's own light, device units; 0
     DISPARITY             float32 [h, w]          to the camera on the right [px]; 0
     DISPARITY_VISIBLE     float32 [h, w]          the same where that camera sees it too; 0
     FLOW_FORWARD          float32 [h, w, 2]       to where the seen point is in this camera's
@@ -66,7 +66,7 @@ class Channel(str, Enum):
                                                   shows a nearer surface; 1
     SCENE_FLOW            float32 [h, w, 3]       where the seen point is a step later, in the
                                                   camera frame of then, minus where it is now, in
-                                                  that of now [m]; NaN
+                                                  the current camera frame [m]; NaN
     DEPTH_LAYERS          float32 [h, w, k]       Z_DEPTH of the surfaces along a ray; inf
     INSTANCE_LAYERS       uint16 [h, w, k]        their instance ids; 0
     MATERIAL_LAYERS       uint16 [h, w, k]        their materials: numbers in
@@ -135,7 +135,7 @@ MIRRORED: Mapping[Channel, NDArray[Any]] = {
     Channel.SEEN_IN_MIRROR: np.zeros((), np.uint16),
     Channel.MIRRORED_POSITION: np.full(3, np.nan, np.float32),
 }
-"""Channels of what mirrors show, with the value of a pixel without a mirrored surface."""
+"""Channels of mirrored surfaces, with the value of a pixel without a mirrored surface."""
 
 LAYERS_MAX = 8
 """Largest number of layers."""
@@ -148,7 +148,7 @@ class Silhouette:
     """An instance without occlusion, on a canvas three images wide and high.
 
     The canvas extends the image as a larger sensor would, within the lens's field: it is empty
-    beside the image of a lens whose whole field is in the image.
+    outside the image of a lens whose whole field is in the image.
 
     Attributes:
         x_px, y_px: Image coordinates of the mask's first pixel; may be negative.
@@ -163,14 +163,15 @@ class Silhouette:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ExpectedSignal:
-    """What a photograph would be without noise, as its sensor reads it, and its noise.
+    """A photograph's noise-free expectation, as its sensor reads it, and its noise.
 
     Both are shares of saturation, float32 [h, w, c]: one value of a pixel behind a colour filter
     (the pattern repeats after two pixels) or on a monochrome sensor, three of others.
 
     Attributes:
-        mean: Of repeated photographs.
-        stddev: Of one photograph about the mean, the sensor's fixed pattern included.
+        mean: Mean of repeated photographs.
+        stddev: Standard deviation of one photograph about the mean, the sensor's fixed pattern
+            included.
     """
 
     mean: NDArray[np.float32]
@@ -184,10 +185,10 @@ class SensorReading:
     Attributes:
         channels: Arrays by channel, as listed in Channel.
         silhouettes: By instance id; empty unless AMODAL was requested.
-        time_s: The instant that depth, ids and boxes refer to; with a rolling shutter, that of the
-            image's middle row (see ``camera.shutter``).
+        time_s: The instant that depth, ids and boxes refer to; with a rolling shutter, the instant
+            of the image's middle row (see ``camera.shutter``).
         ev100: Exposure value that was set or metered; None without a photograph.
-        signal: Of the photograph; None without one, or unless SIGNAL was requested.
+        signal: Expected signal of the photograph; None without one, or unless SIGNAL was requested.
         faults: Faults in the photograph, as plain data; see ``sensors.fault_draws``.
     """
 
@@ -218,11 +219,11 @@ POINT = np.dtype(
 
 ========================  ====================================================================
 position_m                lidar frame: X forward, Y left, Z up [m]
-intensity                 [0, 1], what the device reports after its own range compensation
+intensity                 [0, 1], as the device reports it after range compensation
 time_s                    when the pulse left, from the start of the sweep
 ring                      row of the model's table, from 0, the highest first
-instance_id, category_id  what reflected it; 0 where that is the air or has no label
-surface                   what kind of surface, a number of ``asset_types.SURFACES``
+instance_id, category_id  the reflector's; 0 for air and objects without a label
+surface                   kind of surface, a number of ``asset_types.SURFACES``
 return_number             1 the first of its pulse, 2 the second
 return_count              how many returns its pulse has
 ========================  ====================================================================
@@ -230,11 +231,11 @@ return_count              how many returns its pulse has
 
 
 PATHS = ("direct", "glass", "mirror")
-"""How light reaches what a laser scanner reports: straight, through panes of glass, or by way of a
+"""Path of light from a surface to a laser scanner: straight, through panes of glass, or by way of a
 mirror, a window or a puddle."""
 
 ORIGIN = np.dtype([("path", "u1"), ("true_instance_id", "<u2"), ("true_position_m", "<f4", (3,))])
-"""What a point of a laser scan comes from.
+"""Origin of a point of a laser scan.
 
 ================  ============================================================================
 path              number in ``PATHS``
@@ -288,7 +289,7 @@ class Measurements:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LidarRays:
-    """Rays of a laser scanner; "lidar frame" is that of the scene's instant.
+    """Rays of a laser scanner; the lidar frame is taken at the scene's instant.
 
     Attributes:
         directions: Unit vectors in the lidar frame, float32 [n, 3].
@@ -300,7 +301,7 @@ class LidarRays:
             trajectories are hit where they are then. None = all 0.
         order: Permutation of the beams, int32 [n], that makes neighbours nearly parallel, which
             speeds up tracing; None = they already are.
-        mirrored: Whether secondary hits state what mirrors show.
+        mirrored: Whether secondary hits state the mirrored surfaces.
     """
 
     directions: NDArray[np.float32]

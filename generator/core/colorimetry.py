@@ -1,8 +1,7 @@
 """Colours as numbers: linear RGB with the primaries of Rec. 709 and white D65, which are sRGB's.
 
 Sources: ITU-R BT.709-6, 2015 (luminance); IEC 61966-2-1:1999, the standard of sRGB (transfer
-function; both matrices with the four digits that it prints, so that they undo one another to
-within 1e-3).
+function; both matrices with the four digits that it prints, which undo one another to within 1e-3).
 """
 
 from typing import Any, TypeVar, overload

@@ -1,4 +1,4 @@
-"""Steps of demonstrations: what imitation learning reads of an arm at one instant."""
+"""Steps of demonstrations: an arm's state and action at one instant, for imitation learning."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ class DemonstrationStep:
     """An arm at one instant of a demonstration.
 
     Attributes:
-        positions: Of all movable joints [rad or m].
+        positions: Positions of all movable joints [rad or m].
         action: Their positions one step later, which a position controller would be given.
-        T_base_grasp: Pose of the grasp frame; of the root without a gripper.
-        opening, opening_action: Of the gripper now and one step later, 0 closed and 1 open; of a
+        T_base_grasp: Pose of the grasp frame; pose of the root without a gripper.
+        opening, opening_action: Gripper opening now and one step later, 0 closed and 1 open; of a
             suction cup 0 while it holds something and else 1.
         phase: Name of the part of the program.
         held: Name of the body in the hand; empty = none.

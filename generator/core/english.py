@@ -57,7 +57,7 @@ def singular(name: str) -> str:
 
 
 def count(name: str, number: int) -> str:
-    """A number of things, such as "a mug", "two mugs" and "two pairs of scissors"."""
+    """A number of objects, such as "a mug", "two mugs" and "two pairs of scissors"."""
     if number == 1:
         return singular(name)
     word = NUMBERS[number] if number < len(NUMBERS) else "many"

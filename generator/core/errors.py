@@ -35,7 +35,7 @@ class SampleIndexError(ConfigError, IndexError):
 
 
 class IndexKindError(ConfigError, TypeError):
-    """An index of samples that is no whole number."""
+    """An index of samples that is not a whole number."""
 
 
 class ConfigWarning(UserWarning):
@@ -116,7 +116,7 @@ class OutOfMemory(SampleError):
 
 
 def lack_of_memory(error: BaseException) -> str:
-    """What lacks memory and the remedy, if that caused an error; else empty.
+    """Description of a lack of memory and its remedy, if that caused an error; else empty.
 
     Also where a library could not be loaded.
     """
@@ -175,7 +175,7 @@ class WorkerLost(SampleError):
 
 
 class VerificationError(GenDataError):
-    """A data set differs from what its manifest declares."""
+    """A data set differs from its manifest."""
 
     exit_code = 7
 
@@ -190,7 +190,7 @@ class NoLabels(GenDataError):
     """A finished data set was to have labels, and has none.
 
     Attributes:
-        summary: Of the run that finished it; see ``generate``.
+        summary: Summary of the run that finished it; see ``generate``.
     """
 
     exit_code = 9
@@ -207,21 +207,20 @@ class SamplesSkipped(GenDataError):
 
 
 class Interrupted(GenDataError):
-    """The user asked to stop; what was committed stays and the run can be resumed."""
+    """The user interrupted the run; committed samples stay and the run can be resumed."""
 
     exit_code = 130
 
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """Why one attempt at a scene was refused, and what a user can change.
+    """Why one attempt at a scene was refused, and how a user can avoid it.
 
     Attributes:
         reason: A short noun phrase that equal rejections share, such as ``object fell off``.
-        remedy: What to change, naming a field of the configuration.
+        remedy: The change to make, naming a field of the configuration.
         detail: The objects concerned and by how much; empty = unknown.
-        excess: How far from valid, to compare rejections of one scene; the unit is that of the
-            reason.
+        excess: How far from valid, in the unit of the reason, to compare rejections of one scene.
     """
 
     reason: str
@@ -267,12 +266,12 @@ class SceneRejected(SampleError):
         )
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by the constructor's arguments, so that it crosses process borders."""
+        """Pickle by the constructor's arguments, to cross process borders."""
         return (type(self), (self.scene_index, self.rejections))
 
 
 class Refusals:
-    """Errors of several checks, so that a user can correct all of them at once."""
+    """Errors of several checks, reported together for a user to correct all at once."""
 
     def __init__(self) -> None:
         self._errors: dict[str, ConfigError] = {}
@@ -326,7 +325,7 @@ def one_of(wrong: str, known: Collection[str], most: int = 12) -> str:
 
 
 def no_folder(folder: Path) -> str:
-    """``there is no folder 'x' (did you mean 'y'?)``, of what is in the same folder."""
+    """``there is no folder 'x' (did you mean 'y'?)``, from the names in the same folder."""
     try:
         beside = [path.name for path in folder.parent.iterdir() if path.is_dir()]
     except OSError:

@@ -10,7 +10,7 @@ field ``type`` is ``Literal["<name in the table>"]`` (``renderer`` instead of ``
 renderer) with the name as its default. Instances are frozen, picklable, and created before any
 engine is opened, so importing their module must not import heavy libraries.
 
-Every member of a Protocol below is required. Base classes provide those that few plug-ins need:
+Every member of a Protocol below is required. Base classes provide members that few plug-ins need:
 ``gen_data.randomizers.base.RandomizerBase``, ``gen_data.scene_templates.element.Element``,
 ``gen_data.sensors.mounting.Mounted`` and ``Instrument``,
 ``gen_data.exporters.base.ExporterBase``. A class that lacks a member is refused when it is loaded.
@@ -95,7 +95,7 @@ class AssetIndex(Protocol):
         ...
 
     def stride_bounds_m(self, asset_id: str) -> tuple[se3.Vec3, se3.Vec3]:
-        """Bounds over a whole stride of a person who walks; those of the mesh for all others."""
+        """Bounds over a whole stride of a person who walks; bounds of the mesh for all others."""
         ...
 
     def vertices_m(self, asset_id: str) -> asset_types.Float32:
@@ -118,11 +118,11 @@ class AssetIndex(Protocol):
         ...
 
     def robot(self, asset_id: str) -> asset_types.RobotModel:
-        """Kinematics of a robot. Raises AssetError if the asset is no robot."""
+        """Kinematics of a robot. Raises AssetError if the asset is not a robot."""
         ...
 
     def stage(self, asset_id: str) -> StageModel:
-        """Content of a stage file. Raises AssetError if the asset is no stage."""
+        """Content of a stage file. Raises AssetError if the asset is not a stage."""
         ...
 
     def plate(self, asset_id: str) -> plates.Plate:
@@ -137,7 +137,7 @@ class AssetLibrary(AssetIndex, Protocol):
     """The index and the geometry of assets; everything is cached by content hash."""
 
     def __hash__(self) -> int:
-        """Hash by identity, so that caches of derived geometry may use it as a key."""
+        """Hash by identity: caches of derived geometry use it as a key."""
         ...
 
     def mesh(self, asset_id: str) -> asset_types.MeshData:
@@ -166,7 +166,7 @@ class FileFrames(Protocol):
     """An AssetLibrary with assets from files of the user."""
 
     def file_shift_m(self, asset_id: str) -> se3.Vec3 | None:
-        """What was added to the coordinates of a file, scaled and upright, on import [m].
+        """Offset added to the coordinates of a file, scaled and upright, on import [m].
 
         None for assets that are not of a user's file.
         """
@@ -187,7 +187,7 @@ class DerivedArrays(Protocol):
 
         Args:
             asset_id: Also ``<asset>#<image>``.
-            name: Of the computation and everything else that the result depends on.
+            name: Name of the computation and everything else that the result depends on.
             compute: Computes them; its result depends on the asset and the name alone.
         """
         ...
@@ -195,7 +195,7 @@ class DerivedArrays(Protocol):
 
 @runtime_checkable
 class WrittenAssets(Protocol):
-    """An AssetLibrary that knows what is written on its textures and meshes."""
+    """An AssetLibrary with the text written on its textures and meshes."""
 
     def writing(self, asset_id: str) -> tuple[Writing, ...]:
         """Lines of text on a texture, or of a mesh itself, in the order of drawing.
@@ -210,7 +210,7 @@ class AssetPreparation(Protocol):
     """An engine that computes arrays from assets, which ``DerivedArrays`` stores."""
 
     def prepare_asset(self, asset_id: str) -> None:
-        """Compute and store what this engine derives from an asset and the textures on it.
+        """Compute and store the data that this engine derives from an asset and its textures.
 
         Nothing where it derives nothing from assets of that kind. Raises AssetError as the library.
         """
@@ -316,7 +316,7 @@ class PhysicsEngine(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Tones:
-    """Range of what a camera tells apart.
+    """Range of tones that a camera distinguishes.
 
     Attributes:
         white_cd_m2: Luminance that saturates a single exposure.
@@ -397,10 +397,10 @@ class SensorInfo:
         time_offset_s: Delay of readings after the step's instant [s].
         rgb_encoding: Cameras: encoding of the files of the rgb channel; others are PNG.
         origins: Laser scanners: whether scans have ``capture.ORIGIN`` records.
-        motion_distortion: Laser scanners: the frame of points: ``raw``, that of each pulse's own
-            instant; ``deskewed``, that of the sweep's middle; ``none``, all pulses leave then.
+        motion_distortion: Laser scanners: the frame of points: ``raw``, at each pulse's instant;
+            ``deskewed``, at the sweep's middle; ``none``, all pulses leave then.
         needs_clear_view: Whether a position inside the body that carries it is refused.
-        faults: Kinds of errors in what it reports: ``clock``, ``extrinsics``, ``lost``,
+        faults: Kinds of errors in its readings: ``clock``, ``extrinsics``, ``lost``,
             ``doubled``.
     """
 
@@ -543,7 +543,7 @@ class ViewSequence:
 
     Attributes:
         at: The scene at an instant [s], for sensors and labels.
-        instants_s: Of its steps.
+        instants_s: Instants of its steps.
         assets: Geometry.
         renderer: Traces rays.
         streams: Random streams of the view, the same at all steps.
@@ -561,7 +561,7 @@ class SequenceAnnotator(Protocol):
     """Annotates samples with something that all steps of their sequence share.
 
     ``begin`` chooses it from the view alone: every step can do so by itself, with the same result,
-    so that samples depend on no other. The pipeline keeps the result while it works on the view.
+    and samples depend on no other. The pipeline keeps the result while it works on the view.
     """
 
     @property
@@ -570,7 +570,7 @@ class SequenceAnnotator(Protocol):
         ...
 
     def begin(self, view: ViewSequence) -> object:
-        """Choose what the steps share: a pure function of the view.
+        """Choose the state that the steps share: a pure function of the view.
 
         Raises:
             ConfigError: the scene lacks something that the annotator needs.

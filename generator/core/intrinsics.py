@@ -63,8 +63,8 @@ class Intrinsics:
     def project(self, p_camera_m: Array) -> Array:
         """Image coordinates [px], shape [..., 2], of points in the camera frame, shape [..., 3].
 
-        NaN for points without an image: those with z <= 0 for a pinhole, those outside the field of
-        view for any other lens.
+        NaN for points without an image: for a pinhole, points with z <= 0; for any other lens,
+        points outside the field of view.
         """
         p = np.asarray(p_camera_m, dtype=np.float64)
         if not self.straight:

@@ -1,7 +1,8 @@
-"""Names of keypoints of assets that are conditions of placing things on or at them."""
+"""Names of keypoints that an asset needs for objects to be placed on it or at it."""
 
 SUPPORT = "support"
-"""Keypoints at two opposite corners of a level surface that carries things and is not a top."""
+"""Keypoints at two opposite corners of a level surface, other than the top, that carries
+objects."""
 INSIDE = "inside"
 """Keypoints at the lowest and the highest corner of the room above a board behind doors."""
 BACKREST = "backrest"

@@ -62,7 +62,7 @@ def make_link_bodies(
 
 
 def round_positions(positions: Sequence[float]) -> tuple[float, ...]:
-    """Round joint positions, so that collision checks and labels use the same values."""
+    """Round joint positions; collision checks and labels use the same values."""
     return tuple(round(value, POSITION_DECIMALS) + 0.0 for value in positions)
 
 
@@ -123,7 +123,7 @@ def position_limits(joint: Joint, robot: RobotModel) -> tuple[float, float]:
 
 
 def positions_of(joints: Sequence[Joint], given: Mapping[str, float]) -> tuple[float, ...]:
-    """Positions of all movable joints in order, including those that mimic others.
+    """Positions of all movable joints in order, including joints that mimic others.
 
     ``given`` has the position [rad or m] of every movable joint without ``mimic``, by name.
     """
@@ -158,8 +158,8 @@ def all_positions(
 ) -> tuple[float, ...]:
     """Positions of all movable joints.
 
-    ``arm_positions`` are those of the arm joints, in order [rad or m]; ``opening`` of the gripper
-    is in [0, 1].
+    ``arm_positions`` are positions of the arm joints, in order [rad or m]; ``opening`` of the
+    gripper is in [0, 1].
     """
     remaining = iter(arm_positions)
     given: dict[str, float] = {}

@@ -33,7 +33,7 @@ class LaneLine:
     at_m: tuple[float, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Measure the line; two dozen randomizers ask for that of the same lane."""
+        """Measure the line, cached by lane: two dozen randomizers use the same lane."""
         arc_m = _ARC_LENGTHS.get(self.lane, lambda: _arc_lengths_m(self.lane))
         object.__setattr__(self, "at_m", arc_m)
 

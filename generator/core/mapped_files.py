@@ -24,8 +24,8 @@ def map_file(descriptor: int, size: int) -> memoryview:
     The map lives as long as views of it. The file must not become shorter meanwhile.
 
     Args:
-        descriptor: Of a file that can be read.
-        size: Of the file [bytes], not 0.
+        descriptor: Descriptor of a file that can be read.
+        size: File size [bytes], not 0.
 
     Raises:
         OSError: the system cannot map the file.
@@ -48,7 +48,7 @@ def map_file(descriptor: int, size: int) -> memoryview:
 
 
 def owned_bytes(*arrays: Any) -> int:
-    """Bytes of NumPy arrays that are no views of mapped files."""
+    """Bytes of NumPy arrays that are not views of mapped files."""
     return sum(array.nbytes for array in arrays if not _is_mapped(array))
 
 
@@ -80,7 +80,8 @@ def limit_mapped_pages(kept_bytes: int) -> None:
 class PageLimiter:
     """Drops the pages of all maps whenever many have been read.
 
-    Pages of libraries stay: without them in the sum, maps keep what a scene's views share.
+    Pages of libraries are not counted: with them in the sum, pages that a scene's views share would
+    be dropped.
     """
 
     def __init__(self) -> None:

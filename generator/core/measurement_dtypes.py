@@ -21,7 +21,7 @@ class Column:
 
     Attributes:
         name: With its unit at the end.
-        type: Of the stored number, as numpy spells it, little-endian.
+        type: Type of the stored number, as numpy spells it, little-endian.
         meaning: In a few words; value for "nothing".
     """
 

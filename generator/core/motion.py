@@ -1,7 +1,7 @@
 """Motion: trajectories of bodies and joints, twists, and instantaneous changes of state.
 
-Poses are computed with ``+ - * / sqrt`` only, without transcendental functions, so that they have
-the same bits on every processor.
+Poses are computed with ``+ - * / sqrt`` only, without transcendental functions: they have the same
+bits on every processor.
 """
 
 import math
@@ -19,8 +19,8 @@ class Twist:
     """Velocity, acceleration and angular velocity of a frame at one instant, world axes.
 
     Attributes:
-        velocity_m_s, acceleration_m_s2: Of the frame's origin.
-        angular_velocity_rad_s: Of the frame.
+        velocity_m_s, acceleration_m_s2: Velocity and acceleration of the frame's origin.
+        angular_velocity_rad_s: Angular velocity of the frame.
     """
 
     velocity_m_s: se3.Vec3 = (0.0, 0.0, 0.0)
@@ -47,9 +47,10 @@ _SLOPE_WEIGHTS = ((-1.5, 2.0, -0.5), (-0.5, 0.0, 0.5), (0.5, -2.0, 1.5))
 class Trajectory:
     """Trajectory of one body: poses at equal time steps, interpolated.
 
-    Positions follow cubic Hermite curves with the slopes of Catmull and Rom (1974), so that
-    velocity is continuous; slopes at both ends are those of the parabola through three knots, so
-    that even acceleration is exact. Rotations are interpolated linearly and normalised. The second
+    Positions follow cubic Hermite curves with the slopes of Catmull and Rom (1974), which make
+    velocity continuous; slopes at both ends are taken from the parabola through three knots, which
+    makes constant acceleration exact. Rotations are interpolated linearly and normalised. The
+    second
     derivative of such curves jumps at knots, and so does the rate of such rotations: acceleration
     and angular velocity are interpolated between central differences over a step instead, and
     extrapolated to both ends. Before the first and after the last knot the body is at rest.
@@ -164,7 +165,7 @@ class Trajectory:
         return (x, y, z)
 
     def _slope(self, k: int) -> se3.Vec3:
-        """Displacement per step at a knot: that of the parabola through the nearest knots."""
+        """Displacement per step at a knot: the slope of the parabola through the nearest knots."""
         last = len(self.knots) - 1
         if last == 1:
             (x0, y0, z0), (x1, y1, z1) = (knot.translation_m for knot in self.knots)

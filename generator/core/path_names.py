@@ -38,7 +38,7 @@ def check_inner_path(path: str) -> str:
     """Return a path relative to a folder, with ``/`` between its parts, that stays inside it.
 
     Raises:
-        ValueError: a part is no name.
+        ValueError: a part is not a name.
     """
     if isinstance(path, str) and _ORDINARY.fullmatch(path):
         return path

@@ -16,7 +16,7 @@ def flux_to_intensity_cd(light: Light, flux_lm: float) -> float:
 
     A sphere emits in all directions, a panel into its front half space by Lambert's law, a spot
     into its cone: uniformly up to ``even`` of its half angle, then fading to 0 by a smooth step
-    that is symmetric in the cosine, so that half of the solid angle in between counts.
+    that is symmetric in the cosine, so half of the solid angle in between counts.
 
     Raises:
         ValueError: a sun has no flux.
@@ -66,7 +66,7 @@ def luminance_cd_m2(light: Light) -> float:
         case "disk":
             return light.intensity_cd / (math.pi * light.radius_m * light.radius_m)
         case "sphere" | "spot" | "sun":
-            raise ValueError(f"a light of kind {light.kind} is no panel")
+            raise ValueError(f"a light of kind {light.kind} is not a panel")
 
 
 def scale_to_flux(light: Light, flux_lm: float) -> Light:
@@ -75,7 +75,7 @@ def scale_to_flux(light: Light, flux_lm: float) -> Light:
 
 
 GAP_M = 1e-3
-"""Distance of a panel in front of its fixture, so that the fixture does not shadow it."""
+"""Distance of a panel in front of its fixture, to keep the fixture from shadowing it."""
 LAMP = "lamp"
 """Role of the emissive slots of a fixture."""
 
@@ -100,7 +100,8 @@ def fixture_asset(light: Light) -> str:
 def add_fixture(scene: Scene, light: Light, materials: Sequence[Material]) -> tuple[Scene, Light]:
     """Add the fixture of a panel to a scene; return the scene and the panel attached to it.
 
-    The fixture is background: it has no instance and does not collide. ``materials`` are those of
+    The fixture is background: it has no instance and does not collide. ``materials`` are materials
+    of
     ``fixture_asset(light)``; slots with the role ``lamp`` become emissive.
     """
     z = -np.asarray(light.direction, dtype=np.float64)

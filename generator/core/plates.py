@@ -59,7 +59,7 @@ class Plate:
         size_px: Width and height of the photograph.
         focal_px: Focal length.
         T_world_camera: Pose of the camera in the plate's world.
-        ground_px: Corners of the ground on which things may stand.
+        ground_px: Corners of the ground on which objects may stand.
         lanes: Lanes on the ground, in the plate's world, without ``road``.
         ground_color: Mean colour of the ground in the photograph, linear RGB.
         ground_albedo: Luminous reflectance of the ground.
@@ -105,7 +105,7 @@ class Crop:
 
 
 def upright_pose(up: Array, height_m: float) -> SE3:
-    """``T_world_camera`` of a camera that sees the zenith in a direction, [3], of its own frame.
+    """``T_world_camera`` of a camera by the direction of the zenith, [3], in the camera frame.
 
     Raises:
         ValueError: it looks straight up or down.
@@ -279,7 +279,7 @@ def show_plate(scene: Scene, element: str, asset_id: str, plate: Plate) -> Scene
         scene: It has a body and a camera of the element's name, or a camera that a sensor made
             from it; lights, surfaces and lanes of an earlier photograph are replaced.
         element: Name of the template's element.
-        asset_id: Of the photograph.
+        asset_id: Id of the photograph.
         plate: Its content.
 
     Raises:

@@ -18,7 +18,7 @@ class PluginTable(Generic[P]):
     """All plug-ins of one kind.
 
     Third-party packages add to a table through the entry-point group ``gen_data.<kind>``;
-    a name of our own wins over theirs.
+    a built-in name wins over an equal third-party name.
 
     Attributes:
         kind: Kind of the plug-ins, in the singular: ``randomizer``.
@@ -48,7 +48,7 @@ class PluginTable(Generic[P]):
         """The class that ``name`` stands for.
 
         Raises:
-            ConfigError: if the name is unknown, or its class is no plug-in of this kind.
+            ConfigError: if the name is unknown, or its class is not a plug-in of this kind.
         """
         if name not in self:
             known = self.names()
@@ -61,7 +61,7 @@ class PluginTable(Generic[P]):
         return plugin
 
     def _fault(self, plugin: type[P], name: str) -> str:
-        """Why a class is no plug-in of this kind; empty if it is one."""
+        """Why a class is not a plug-in of this kind; empty if it is one."""
         if not self.protocols:
             return ""
         if not hasattr(plugin, "model_validate_json"):
@@ -81,7 +81,7 @@ def loaded(path: str, what: str) -> Any:
     """The object at ``module:Name``.
 
     Raises:
-        ConfigError: there is none; the message begins with ``what``.
+        ConfigError: there is none; the message begins with the subject ``what``.
     """
     module, _, attribute = path.partition(":")
     try:

@@ -25,8 +25,8 @@ def moved_points(
     """Where points are as much later as one scene is after another.
 
     A point keeps its place in the frame of its body. Where the body's mesh changes, it moves with
-    the nearest triangle. The nearest triangle also tells the body, if an instance has several, or
-    if bodies without an instance move. Meshes are as in the two scenes, poses as at the instants
+    the nearest triangle. The nearest triangle also determines the body, if an instance has several,
+    or if bodies without an instance move. Meshes are as in the two scenes, poses as at the instants
     of the points.
 
     Args:
@@ -35,7 +35,7 @@ def moved_points(
         assets: Meshes of its bodies.
         p_world: Points, each as at its instant [m], [n, 3].
         instance_id: Instance of each; 0 = none, [n].
-        delays_s: Instant of each, after that of ``now`` [s], [n].
+        delays_s: Instant of each point minus the instant of ``now`` [s], [n].
 
     Returns:
         World coordinates [m], [n, 3], and whether each is known, [n]: points on nothing that moves

@@ -23,7 +23,7 @@ Sums in BLAS depend on the number of threads, and with them the last bits of a p
 
 PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 WATCH_S = 0.5
-"""How often a parent is looked for where the kernel tells nobody of its end."""
+"""Interval at which a parent is checked where the kernel does not signal its end [s]."""
 
 
 def end_with_parent(parent_pid: int) -> None:

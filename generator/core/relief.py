@@ -39,8 +39,8 @@ class RoadProfile:
 
     Attributes:
         x_m, y_m, yaw_rad: Start of its reference line.
-        curvature_per_m: Of its reference line, positive to the left.
-        length_m: Of its reference line.
+        curvature_per_m: Curvature of its reference line, positive to the left.
+        length_m: Length of its reference line.
         half_width_m: Distance from the reference line within which the profile alone decides; cells
             that end within it are level across.
         left, right: Rise of the land on its sides, away from the road, per metre.
@@ -48,7 +48,7 @@ class RoadProfile:
         grade: Rise per metre at its start.
         curves: Three vertical curves, in order, each ``start_m, length_m, change``: parabolas
             along which the grade changes by so much.
-        bends: Of its reference line in plan, in order, each ``start_m, spiral_m, arc_m,
+        bends: Bends of its reference line in plan, in order, each ``start_m, spiral_m, arc_m,
             curvature_per_m, bank``: between two clothoids, an arc, in which the road slopes down to
             the inside by ``bank``.
     """
@@ -257,8 +257,8 @@ class Relief:
             at = end
         if not roads or at != len(numbers):
             raise ValueError(
-                f"{len(numbers)} numbers are no relief; expected {plain + 10} per road, the last "
-                "of them that of its bends, and 5 per bend"
+                f"{len(numbers)} numbers are not a relief; expected {plain + 10} per road, the "
+                "last of which is its number of bends, and 5 per bend"
             )
         return cls(tuple(roads))
 

@@ -1,6 +1,6 @@
 """Reported values of sensors, where faults make them differ from the true ones.
 
-The truth is in the fields of a reading; its ``faults`` state what the sensor reports instead.
+The truth is in the fields of a reading; its ``faults`` state the reported values.
 """
 
 from dataclasses import replace

@@ -9,8 +9,8 @@ from gen_data.core.scene import Camera, Instance, Scene
 from gen_data.core.se3 import IDENTITY, SE3, Array
 
 _ITERATIONS = 5
-"""The row of a point depends on its instant and vice versa. Fixed-point iteration shrinks the error
-by the speed of the image over that of the readout, a factor of ten or more, each time."""
+"""The row of a point depends on its instant and vice versa. Each fixed-point iteration shrinks the
+error by the ratio of the image's speed to the readout's, a factor of ten or more."""
 
 
 def project_rolling_shutter(
@@ -44,7 +44,7 @@ def project_moving_points(
 
     Args:
         scene: At the image's instant.
-        camera: Of the image.
+        camera: Camera of the image.
         world: World coordinates [m] of the points, [n, 3], at their delays from that instant [n].
         count: Number of points.
 

@@ -10,7 +10,7 @@ from gen_data.core.errors import AssetError
 MAX_DEPTH = 64
 _OTHER_VERSION = re.compile(rb"""\A((?:\xef\xbb\xbf)?<\?xml\s+version\s*=\s*["'])(?!1\.)[^"']+""")
 """Start of a document of a version that does not exist. Files of pybullet declare 0.0, which Expat
-2.5 reads and that of Debian 13 refuses."""
+2.5 reads and Expat of Debian 13 refuses."""
 
 
 class PlacedElement(Element):

@@ -91,7 +91,7 @@ class ObjectTruth:
         amodal_mask: The whole silhouette, clipped to the image (amodal_masks).
         visible_fraction: Visible pixels / pixels of the whole silhouette, in or out of the image
             (BOP's visib_fract) (visibility).
-        occlusion: Share of the silhouette inside the image that other things hide (visibility).
+        occlusion: Share of the silhouette inside the image that other objects hide (visibility).
         truncation: Share of the silhouette that lies outside the image (visibility).
         detectability: Contrast of the visible pixels to the pixels around them over the noise:
             d' of the ideal observer; None without a photograph too (detectability).
@@ -134,7 +134,7 @@ class BorderTruth:
         border: Name of the ``LaneBorder``; one that leaves the image and returns has several.
         kind: As there.
         points_px: Image coordinates, in the border's direction.
-        visible: Whether each point is seen, or hidden by what stands before it.
+        visible: Whether each point is seen; False where a nearer object hides it.
     """
 
     border: str
@@ -319,7 +319,7 @@ class ImageTruth:
 
     Attributes:
         objects: In order of instance id.
-        borders: Of lanes, in order of the scene's (lanes).
+        borders: Lane borders, in order of the scene's (lanes).
         free_space: Pixels that show ground on which one may drive and nothing stands (free_space).
         relations: Among the instances that the image shows, in order (relations).
         utterances: Captions, expressions and questions (language).
@@ -354,12 +354,12 @@ class BirdseyeMap:
 
 
 VOXEL_STATES = ("free", "surface", "interior")
-"""What is at a voxel, by index."""
+"""States of a voxel, by index."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Occupancy:
-    """Voxels around the ego: what is in them, and which sensors have observed them.
+    """Voxels around the ego: their states and instances, and which sensors have observed them.
 
     Attributes:
         T_world_frame: Frame of the voxels' coordinates.
@@ -384,9 +384,10 @@ class Occupancy:
         return np.asarray((voxels + 0.5) * self.voxel_m + self.low_m)
 
     def velocities_m_s(self, instances: Iterable[Instance]) -> NDArray[np.float32]:
-        """Velocity of what is in each voxel, axes of the frame, [x, y, z, 3]; 0 = at rest or free.
+        """Velocity of each voxel's instance, axes of the frame, [x, y, z, 3]; 0 = at rest or free.
 
-        That of rigid bodies at the voxels' centres: limbs of a person move with the person.
+        Instances move as rigid bodies, evaluated at the voxels' centres: limbs of a person move
+        with the person.
         """
         velocities = np.zeros((*self.state.shape, 3), np.float32)
         T_frame_world = self.T_world_frame.inverse()
@@ -490,13 +491,14 @@ class EgoTruth:
         T_world_ego: Its pose.
         twist: How it moves, world axes.
         boxes3d: By frame, the boxes of annotated instances, by instance id: ``ego``, and every
-            laser scanner at the instant of its own sweep (boxes3d).
-        borders: Of lanes, world (lanes).
+            laser scanner at the instant of its sweep (boxes3d).
+        borders: Lane borders, world frame (lanes).
         birdseye: The ground from above (bev_map).
         occupancy: Voxels around the ego (occupancy).
         tracks: Points followed over the sequence (tracks).
-        relations: Of annotated instances in space, whoever sees them, in order (relations).
-        grasps: Of annotated loose instances, by instance and falling score (grasps).
+        relations: Relations of annotated instances in space, whether seen or not, in order
+            (relations).
+        grasps: Grasps of annotated loose instances, by instance and falling score (grasps).
         suctions: The same for suction cups (grasps).
         extra: Results of third-party annotators, plain data by the annotator's type.
     """
@@ -521,7 +523,7 @@ class Sample:
 
     Attributes:
         index: Number in the data set, from 0: scene, then view, then step, the last the fastest.
-        step_index: Instant of its view's sequence; ``scene.time_s`` tells when.
+        step_index: Instant of its view's sequence; ``scene.time_s`` is its time.
         split: ``train``, ``val`` or ``test``: the same for all views of a scene.
         scene: The final world; rendering it again needs no randomizer and no physics.
         truth: Annotations by sensor name.
@@ -529,8 +531,8 @@ class Sample:
         attempts: How many layouts were drawn before this one was accepted.
         view_attempts: How many views were drawn before this one was accepted.
         timings_s: Seconds of CPU by stage. Never written to a data file.
-        cameras: Sorted names of all cameras of the data set, also of those that do not read at
-            this step; empty = those that do.
+        cameras: Sorted names of all cameras of the data set, including cameras that do not read at
+            this step; empty = the cameras that read at this step.
         instants: The world at the readings of sensors that do not read at the sample's instant.
     """
 

@@ -39,12 +39,12 @@ LaneKind = Literal[
 
 
 Box3dExtent = Literal["body", "all", "annotated"]
-"""What 3D boxes enclose: the body of a vehicle, without exterior mirrors; all of it; or the body,
-and people as widely as annotators of tracks draw them."""
+"""Extent of 3D boxes: the body of a vehicle, without exterior mirrors; all of it; or the body, and
+people as widely as annotators of tracks draw them."""
 
 PERSON_MARGIN_M = 0.05
-"""What annotators leave on each side of a person and above: KITTI's boxes are .66 m wide on average
-(sizes of Frustum PointNets, CVPR 2018), people with their swinging arms .57 m."""
+"""Margin that annotators leave on each side of a person and above: KITTI's boxes are .66 m wide on
+average (sizes of Frustum PointNets, CVPR 2018), people with their swinging arms .57 m."""
 
 LABEL_IDS_MAX = 65_535
 """Largest instance id and category id: label images have 16 bits."""
@@ -239,7 +239,7 @@ class ArmGoal:
             object and its rotation about Z, instead of poses of the hand.
         touches: Names of the bodies that a ``move`` may touch and push.
         pivots: Whether a ``move`` leads the hand's origin along the waypoints without turning the
-            hand; what it holds turns about the line between the fingers as contacts make it.
+            hand; the held object turns about the line between the fingers as contacts make it.
         phase: Name of this part of a demonstration in labels; empty = the kind.
         arms: Names of the arms that pursue it, in demonstrations; several move together. Empty =
             the arm whose task it is part of.
@@ -296,10 +296,10 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """What an arm is asked to do: the goals of ``Articulation.task`` are its program.
+    """An arm's assignment: the goals of ``Articulation.task`` are its program.
 
     Attributes:
-        name: Of the task.
+        name: Name of the task.
         instruction: The task as a sentence.
         success: Conditions that physics must confirm.
         failure: Failure that is to happen; empty = none.
@@ -329,7 +329,7 @@ class BodyJoint:
         anchor_m: A point of the axis in the frame of the body.
         lower, upper: Limits of the position [m or rad], which is 0 at time 0.
         friction: Force or torque that moves it at least [N or N m].
-        stiffness: Of a spring that returns it to 0 [N/m or N m/rad].
+        stiffness: Stiffness of a spring that returns it to 0 [N/m or N m/rad].
     """
 
     body: str
@@ -358,9 +358,9 @@ class ContactSpan(Span):
     Attributes:
         label: Names of both, sorted, with `` + `` between them.
         step_s: Time between the values of ``forces_n`` and ``points_m``, of which the first one
-            is that at ``start_s``.
+            is taken at ``start_s``.
         forces_n: Sum of the normal forces that the engine found between them; 0 where it pushed
-            neither: what a hand holds moves as planned.
+            neither: a held object follows its planned path.
         points_m: Middle of their contact points in the world.
     """
 
@@ -412,7 +412,7 @@ class Articulation:
         workspace_m: Low and high corner [m] of the targets of its hand, world.
         task: Its goals from time 0 on, one after the other: all kinds but ``hold``.
         joint_track: Trajectory of its joints; None = they do not move.
-        assignment: What the task is for; None = a motion that nothing judges.
+        assignment: Purpose of the task; None = a motion that is not judged.
         episode: Its demonstration in physics; None = there is none.
     """
 
@@ -431,7 +431,7 @@ class Articulation:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The motion of a settled scene: one of those that may follow from its time 0."""
+    """A motion of a settled scene: one of several that may follow from its state at time 0."""
 
     articulations: tuple[Articulation, ...]
     tracks: tuple[Trajectory, ...]
@@ -451,7 +451,7 @@ class Light:
             luminance times their area.
         illuminance_lux: On a surface that faces it [lx] (sun).
         radius_m: Radius of the emitter, which makes shadows soft (sphere, spot, disk).
-        size_m: Of the rectangle, along ``side`` and across it.
+        size_m: Size of the rectangle, along ``side`` and across it.
         side: Unit vector along the rectangle's first side, perpendicular to ``direction``.
         angular_radius_rad: Angular radius of the sun's disc.
         cone_rad: Half angle at which a spot has faded to 0.
@@ -694,7 +694,7 @@ class Scene:
         shared: Shared values, ``(name, value)``, sorted by name.
         time_s: The scene's instant; 0 = as built.
         step_s: Time between the instants of its sequence.
-        box3d: What the 3D boxes of its instances enclose.
+        box3d: Extent of the 3D boxes of its instances.
         tracks: Trajectories of bodies; at most one per body.
         changes: Changes of state, in order of time.
         relief: Height of its ground above the level world of its layout; None = it is level. A
@@ -781,7 +781,7 @@ class Scene:
         raise KeyError(instance_id)
 
     def with_bodies(self, *changed: Body) -> "Scene":
-        """The scene with bodies replaced by those of the same name."""
+        """The scene with bodies replaced by the given bodies of the same name."""
         by_name = {body.name: body for body in changed}
         return replace(self, bodies=tuple(by_name.get(b.name, b) for b in self.bodies))
 

@@ -31,9 +31,8 @@ def scene_at(scene: Scene, time_s: float) -> Scene:
     """The scene at another instant.
 
     Moves bodies, joints, lights, rigs, sensors and the frames of instances along the trajectories,
-    and applies the state changes up to then. Changes are accumulated from time 0, so that the
-    result does not depend on the scene's current instant; a body keeps its state until its first
-    change.
+    and applies the state changes up to then. Changes are accumulated from time 0; the result does
+    not depend on the scene's current instant. A body keeps its state until its first change.
 
     Boxes of instances with several bodies (robots) are not updated, as that takes geometry: scenes
     for sensors and labels come from ``gen_data.pipeline.finalize_scene.Timeline``.
@@ -223,7 +222,7 @@ def _moved_joints(arm: Articulation, time_s: float) -> Articulation:
 
 
 def moved_light(light: Light, T_new_old: SE3) -> Light:
-    """The light after a motion of what carries it, rounded as in files."""
+    """The light after a motion of its carrier, rounded as in files."""
     x, y, z = (T_new_old @ SE3(light.position_m)).translation_m
     dx, dy, dz = (float(v) for v in T_new_old.rotate(light.direction))  # type: ignore[arg-type]
     moved = replace(

@@ -1,7 +1,7 @@
 """Rigid poses in three dimensions.
 
-Composition and application use only ``+ - * / sqrt``, so that a pose has the same bits on every
-processor. ``T_world_body`` maps body coordinates to world coordinates.
+Composition and application use only ``+ - * / sqrt``: a pose has the same bits on every processor.
+``T_world_body`` maps body coordinates to world coordinates.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class SE3:
         return rotated
 
     def rounded(self, decimals: int = 6) -> SE3:
-        """The same pose on a decimal grid, re-normalised: what crosses from physics to labels."""
+        """The pose on a decimal grid, re-normalised, to pass from physics to labels."""
         tx, ty, tz = self.translation_m
         w, x, y, z = self.quaternion_wxyz
         fine = decimals + 2

@@ -17,7 +17,8 @@ class Shutter:
 
     Attributes:
         exposure_s: Exposure time of every row; 0 = an instant.
-        readout_s: Time from the exposure of the image's upper edge to that of its lower edge;
+        readout_s: Time from the exposure of the image's upper edge to the exposure of its lower
+            edge;
             negative if the lower edge comes first, 0 = a global shutter.
         samples: Largest number of instants averaged into an exposure.
     """

@@ -1,7 +1,7 @@
-"""Two cameras side by side: disparities, and what only one of them sees.
+"""Two cameras side by side: disparities, and the points that only one of them sees.
 
 Both look the same way through the same pinhole, the second to the right of the first: the images
-are rectified. What the left one shows in column ``x`` the right one shows in ``x - disparity``.
+are rectified. A point at column ``x`` of the left image is at ``x - disparity`` of the right one.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ def baseline_m(left: scene.Camera, right: scene.Camera) -> float:
     """How far the right camera is to the right of the left one.
 
     Raises:
-        ValueError: they are no rectified pair.
+        ValueError: they are not a rectified pair.
     """
     if left.intrinsics != right.intrinsics or not left.intrinsics.straight:
         raise ValueError("they are not the same pinhole")
@@ -52,12 +52,12 @@ def disparity_px(z_depth_m: asset_types.Float32, focal_baseline: float) -> asset
 def is_seen_by_both(
     here_px: asset_types.Float32, there_px: asset_types.Float32, *, beyond: bool = False
 ) -> NDArray[np.bool_]:
-    """Whether the other camera sees what this one does, bool [h, w].
+    """Whether the other camera sees the points that this one does, bool [h, w].
 
     It does if the point is in its image and the column that the point lies in shows nothing nearer.
     Disparities of both images have the same sign; 0 = nothing.
 
-    ``beyond``: the other one, such as a projector, also sees points beside its image.
+    ``beyond``: the other one, such as a projector, also sees points outside its image.
     """
     height, width = here_px.shape
     column = np.floor(np.arange(width, dtype=np.float32) + 0.5 - here_px).astype(np.int64)

@@ -1,6 +1,6 @@
-"""Calls of the system that not every platform has, and what stands in for them.
+"""System calls that not every platform has, and their replacements.
 
-POSIX systems lack some calls of Linux, Windows lacks most of them. Each function here asks for the
+POSIX systems lack some calls of Linux, Windows lacks most of them. Each function here tests for the
 call itself, not for the name of the system.
 """
 
@@ -44,8 +44,8 @@ def keep_freed_memory() -> None:
 
     By default, glibc unmaps arrays of 128 kB and more when they are freed and trims the heap; every
     temporary image then costs one page fault per 4 kB. ``malloc_trim`` still returns everything.
-    Sizes are the largest arrays on the heap, as large as glibc allows, and what may be free at its
-    end. Other C libraries have no such settings.
+    The two limits, on the size of arrays on the heap and on free memory at its end, are as large as
+    glibc allows. Other C libraries have no such settings.
     """
     with suppress(AttributeError, OSError, TypeError):
         libc = ctypes.CDLL(None)

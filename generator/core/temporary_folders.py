@@ -30,7 +30,7 @@ class TemporaryFolder:
         purpose: Part of its name.
 
     Attributes:
-        path: Of the folder.
+        path: Path of the folder.
     """
 
     def __init__(self, purpose: str) -> None:

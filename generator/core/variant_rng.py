@@ -43,7 +43,7 @@ class Drawing:
     """Named draws of one asset.
 
     Attributes:
-        asked: Values that its id asks for.
+        asked: Values that its id sets.
         drawn: Named draws so far.
         root: First word of the name of the first stream. Streams of other first words belong to
             other assets, which the asset contains or resembles.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Provide the name of a new file beside ``path``, which it replaces after the block.
+    """Provide the name of a new file next to ``path``, which it replaces after the block.
 
     Missing folders are created. After an error, ``path`` is as it was.
     """

@@ -1,6 +1,6 @@
 """Atomic installation, verification and removal of packs.
 
-All work happens in a scratch folder beside the installed packs and ends with one rename. A lock
+All work happens in a scratch folder next to the installed packs and ends with one rename. A lock
 prevents concurrent installations; the next one removes scratch folders of killed processes.
 """
 

@@ -1,7 +1,7 @@
 """Packs of a user's assets: one file with equal bytes for equal content, named by its digest.
 
 A pack is a ZIP file without compression, whose bytes would depend on the release of a library; its
-members are sorted, and have no times and no rights of their own.
+members are sorted, and have no times and no access rights.
 """
 
 import re
@@ -102,7 +102,7 @@ def _check_format(pack: Path) -> None:
         comment = ""
     stated = re.fullmatch(r"gen-data assets, format (\d{1,9})", comment)
     if stated is None:
-        raise AssetError(f"{pack}: is no pack; expected one that gen-data assets pack wrote")
+        raise AssetError(f"{pack}: is not a pack; expected one that gen-data assets pack wrote")
     if int(stated[1]) > FORMAT:
         raise AssetError(
             f"{pack}: is of format {stated[1]}, newer than this gen-data; expected {FORMAT}: "

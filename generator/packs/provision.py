@@ -17,7 +17,7 @@ def open_assets(user_roots: Sequence[Path] = ()) -> library.Library:
 def provide_pybullet(folder: Path) -> None:
     """Install the pack with the files of pybullet, which is installed where it has a wheel.
 
-    One line on stderr tells that it is fetched. Several processes may call this at once.
+    One line on stderr reports that it is fetched. Several processes may call this at once.
 
     Args:
         folder: Folder of installed packs.
@@ -44,5 +44,5 @@ def provide_pybullet(folder: Path) -> None:
     except AssetError as error:
         raise AssetError(
             f"{error}\n  Robot arms and some objects are files of pybullet. With {OFFLINE}=1, "
-            "what needs none of them goes on without"
+            "everything that needs none of them goes on without"
         ) from None

@@ -27,7 +27,7 @@ SHELL_M = 0.001
 """Bullet's collision margin of hulls, which is fixed for parts of a compound."""
 
 _SHELL_SHARE_MAX = 0.4
-"""Largest shrinkage over a part's smallest width, so that no hull vanishes."""
+"""Largest shrinkage over a part's smallest width: no hull vanishes."""
 _RETREAT_MAX = 1.75
 """Just above the square root of 3 of a box's corner. Sharper tips move less than their faces
 require: a gap of less than half a margin is better than a tip that sinks in by several.
@@ -264,9 +264,9 @@ def _retreats(normals: Array, faces: NDArray[Any], points: int) -> Array:
     A little damping selects the shortest solution where all faces of a vertex are coplanar.
 
     Args:
-        normals: Of the faces, [f, 3].
+        normals: Normals of the faces, [f, 3].
         faces: Indices of their corners, [f, 3].
-        points: Number of points, including those on no face.
+        points: Number of points, including points on no face.
 
     Returns:
         float64 [points, 3].

@@ -56,7 +56,7 @@ class Engine:
         joint positions and poses hold the result.
 
         Raises:
-            AssetError: an asset has no collision geometry, or is no robot.
+            AssetError: an asset has no collision geometry, or is not a robot.
         """
         free = [body for body in _solids(scene) if body.name not in _held(scene)]
         falling = [body for body in free if body.motion == "dynamic"]
@@ -192,7 +192,7 @@ class Engine:
     def _demonstrate_twins(
         self, scene: Scene, fixed: list[str], fallen: list[str], arms: list[tuple[Arm, ArmState]]
     ) -> Scene | Rejection:
-        """The scene with demonstrations that fail, and with those that recover as ``recovery``.
+        """The scene with demonstrations that fail, and with recovering ones as ``recovery``.
 
         Both begin in a world that was filled with the same bodies: nothing of the one is in the
         other.

@@ -3,9 +3,9 @@
 The only module that imports MuJoCo. Its models are compiled as a whole: bodies that are added or
 removed take effect when something is next asked of the world, and all keep their motion.
 
-Differences from Bullet: hulls have no margin, so that none are shrunk; restitution is ignored; of
-two coefficients of friction the larger one counts instead of their product, so that squares are
-given, with which equal surfaces agree.
+Differences from Bullet: hulls have no margin and are not shrunk; restitution is ignored; of two
+coefficients of friction the larger one counts instead of their product, and squares are given, with
+which equal surfaces agree.
 """
 
 import math
@@ -64,7 +64,7 @@ class _Solid:
 
 @dataclass(eq=False, slots=True)
 class _Compiled:
-    """A model with its state; ``names`` are those of bodies by MuJoCo's number."""
+    """A model with its state; ``names`` are names of bodies by MuJoCo's number."""
 
     model: mujoco.MjModel
     data: mujoco.MjData
@@ -392,7 +392,7 @@ def _add_joint(body: mujoco.MjsBody, solid: _Solid, joint: BodyJoint, time_step_
 
 
 def _thick(hull: Hull, scale: float) -> Array:
-    """Vertices [n, 3] at a scale; those of a flat part twice, on both sides of its plane."""
+    """Vertices [n, 3] at a scale; vertices of a flat part twice, on both sides of its plane."""
     points = hull.vertices_m * scale
     if hull.width_m * scale >= _FLAT_M:
         return points

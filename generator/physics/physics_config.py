@@ -70,7 +70,8 @@ class PhysicsConfig(Strict):
     guard_walls: bool = Field(
         True,
         description="Invisible walls keep objects from rolling off open surfaces while they "
-        "settle; what then cannot rest without them is dropped again nearer to the middle.",
+        "settle; objects that then cannot rest without them are dropped again nearer to the "
+        "middle.",
     )
     layout_attempts_max: int = Field(
         20, ge=1, le=1000, description="Layouts tried for one scene before it is given up."

@@ -99,7 +99,7 @@ class Settling:
         return self._come_to_rest() if rests and leaning else rests
 
     def _lower(self, loose: Sequence[Body], fixed: Sequence[str], arms: Sequence[str]) -> None:
-        """Lower each body to just above the next obstacle: short falls hardly scatter objects."""
+        """Lower each body to just above the next obstacle: short falls scatter objects little."""
         names = [body.name for body in loose]
         movable = [*arms, *(b.name for b in self._falling if b.name not in names)]
         for name in names:
@@ -208,7 +208,7 @@ class Settling:
 
 
 def candidate_surfaces(scene: Scene, body: Body) -> tuple[SupportSurface, ...]:
-    """Surfaces that a body may rest on: those of its group, or all if it has none."""
+    """Surfaces that a body may rest on: its group's, or all if it has none."""
     for group in scene.groups:
         if group.name == body.group:
             return tuple(s for s in scene.surfaces if s.name in group.surfaces)

@@ -1,4 +1,4 @@
-"""The seam to rigid-body simulators: what settling and planning ask of a simulated world."""
+"""The seam to rigid-body simulators: the simulated world that settling and planning use."""
 
 import math
 from collections.abc import Iterable
@@ -35,9 +35,9 @@ class Contact(NamedTuple):
 
 
 class World(Protocol):
-    """Rigid bodies by name, with poses of their own frames; ``reset`` must be called first.
+    """Rigid bodies by name, with poses of the bodies' frames; ``reset`` must be called first.
 
-    What happens in it depends on the calls since the last ``reset`` only. Overlapping bodies are
+    Its state depends on the calls since the last ``reset`` only. Overlapping bodies are
     separated without giving them speed.
     """
 
@@ -96,7 +96,7 @@ class World(Protocol):
         """Move the joint of a body; position and speed of the joint remain.
 
         Args:
-            name: Of a jointed body.
+            name: Name of a jointed body.
             T_world_home: Pose of the body at position 0.
         """
         ...

@@ -1,4 +1,4 @@
-"""Checks of what a renderer returns, before any sensor works on it.
+"""Checks of a renderer's results, before any sensor works on them.
 
 A NaN does not survive processing: Warp's ``clamp`` and ``min`` make a bound of it, a conversion to
 bytes makes it black, and a scanner takes it for no hit. A finished reading does not show it.

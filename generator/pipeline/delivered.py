@@ -1,8 +1,9 @@
 """Data sets without the readings that are lost on their way, for exporters.
 
-Shards and ``labels.jsonl`` have all readings. What arrives is linked into the folder
-``_delivered`` of a shard, which is the shard that exporters see: a lost reading is missing, as that
-of a sensor that does not read at this step. Exporters that show the truth have all readings.
+Shards and ``labels.jsonl`` have all readings. The readings that arrive are linked into the folder
+``_delivered`` of a shard, which is the shard that exporters see: a lost reading is missing, like a
+reading of a sensor that does not read at this step. Exporters that show the truth have all
+readings.
 """
 
 from collections.abc import Iterable, Sequence
@@ -41,7 +42,7 @@ class DeliveredExporter:
         return self.exporter.has_own_classes
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse what the exporter refuses."""
+        """Raise the exporter's refusals."""
         self.exporter.check(info)
 
     def with_assets(self, assets: AssetLibrary) -> "DeliveredExporter":

@@ -101,7 +101,7 @@ class ExporterView:
         return replace(info, sensors=tuple(sensors))
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse what the exporter refuses, and what cannot be rectified.
+        """Raise the exporter's refusals, and refuse sensors that cannot be rectified.
 
         Raises:
             ConfigError: also a name that fits no sensor, or texts about images that are rectified.
@@ -167,7 +167,7 @@ class ExporterView:
         return not self.cameras or any(fnmatchcase(camera, pattern) for pattern in self.cameras)
 
     def _sample(self, seen: DatasetInfo, sample: Sample, folder: Path) -> Sample:
-        """A sample as the exporter sees it; its ids of images are those of the whole data set."""
+        """A sample as the exporter sees it, with the image ids of the whole data set."""
         names = {sensor.name for sensor in seen.sensors}
         capture = sample.capture
         readings = {
@@ -268,7 +268,7 @@ def view_of(own: Exporter, exporter: Exporter, thresholds: Thresholds) -> Export
     Args:
         own: As configured.
         exporter: The same, perhaps behind a label map.
-        thresholds: Of the data set.
+        thresholds: Thresholds of the data set.
     """
     if not isinstance(own, ExporterBase):
         return exporter
@@ -279,7 +279,7 @@ def view_of(own: Exporter, exporter: Exporter, thresholds: Thresholds) -> Export
 
 
 def needs_of(own: Exporter) -> frozenset[str]:
-    """Names of the annotators that a configured exporter reads, those of its view included."""
+    """Names of the annotators that a configured exporter and its view read."""
     return view_of(own, own, Thresholds()).needs
 
 

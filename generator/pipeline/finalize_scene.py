@@ -14,7 +14,7 @@ from gen_data.core.se3 import SE3, Array, Vec3
 
 PEOPLE = frozenset({"person", "pedestrian"})
 _measured: ObjectCache[CountCache[dict[str, Any]]] = ObjectCache(1)
-"""``_own_measures`` of the latest library: streets stand full of equal things."""
+"""``_own_measures`` of the latest library: streets are full of equal objects."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ def finalize_scene(
 
     An instance of one body has that body's frame. An instance of several bodies (a robot) has
     the frame of its articulation's base, and the box around all its bodies' vertices. Bounds
-    without mirrors are those of the single body's asset, unless ``scene.box3d`` is ``all``. What a
-    finalized scene ``before`` has as the same objects is not measured again.
+    without mirrors are the bounds of the single body's asset, unless ``scene.box3d`` is ``all``.
+    Objects that a finalized scene ``before`` shares are not measured again.
     """
     known = () if before is None else (*before.bodies, *before.instances)
     still = {id(item) for item in known}

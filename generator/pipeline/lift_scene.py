@@ -12,7 +12,8 @@ four rules:
 - All others stay upright: people at the height of the ground below their middle, objects at
   its lowest height below them.
 
-Trajectories follow the same rules at each knot. What flies is raised by the height of the highest
+Trajectories follow the same rules at each knot. Flying objects are raised by the height of the
+highest
 lane, and keeps its motion.
 """
 
@@ -35,7 +36,7 @@ from gen_data.traffic.axles import find_axles
 
 Stance = Literal["tilted", "upright", "centred", "built", "raised", "flown"]
 _FOOT_MAX_M = 1.5
-"""Half extents of what stands upright are cut to this: crowns of trees hang over other ground."""
+"""Half extents of upright objects are cut to this: crowns of trees hang over other ground."""
 _CAR_M = (2.7, 1.5)
 """Wheelbase and track of the vehicle that carries a camera: means of passenger cars, assumed."""
 _STOREY_M = 1.0

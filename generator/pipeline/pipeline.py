@@ -90,7 +90,7 @@ class DrawnView:
     """A view of a scene at the beginning of its sequence, with the streams that drew it.
 
     Attributes:
-        number: Of the view among those of all scenes.
+        number: Number of the view among the views of all scenes.
     """
 
     number: int
@@ -157,7 +157,7 @@ class Pipeline:
         return numerics_digests(self.renderer, self._physics)
 
     def prepare_asset(self, asset_id: str, *, collides: bool) -> None:
-        """Store what the renderer derives from an asset, and physics if it may collide.
+        """Store the data that the renderer derives from an asset, and physics if it may collide.
 
         Raises:
             AssetError: the asset cannot be made or read.

@@ -2,7 +2,7 @@
 
 Photographs are interpolated bilinearly, as ``cv2.undistort`` does. Label images take the pixel that
 the ray through the centre of the new pixel meets, without mixing: ids are never invented, and a
-label differs from that of a rendered pinhole only where a silhouette passes between the centres of
+label differs from a rendered pinhole's only where a silhouette passes between the centres of
 the two pixels, which are at most half a pixel of the original apart on each axis. Everything that
 follows from label images is computed again from the rectified ones, by the annotators.
 
@@ -124,10 +124,10 @@ def _is_covered(source: Intrinsics, fx_px: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Rectification:
-    """The map from the image of a bent lens to that of a pinhole with the same pose.
+    """The map from the image of a bent lens to the image of a pinhole with the same pose.
 
     Attributes:
-        source: Of the image as it is.
+        source: Intrinsics of the image as it is.
         target: A pinhole.
     """
 
@@ -150,7 +150,7 @@ class Rectification:
         return self._take(image, self._places(self._window), nothing)
 
     def mask(self, mask: MaskPx) -> MaskPx:
-        """A mask with its parts beside the new image, on a canvas of three by three images."""
+        """A mask with its parts outside the new image, on a canvas of three by three images."""
         height, width = mask.pixels.shape
         whole = np.zeros((self.source.height_px, self.source.width_px), bool)
         whole[mask.y_px : mask.y_px + height, mask.x_px : mask.x_px + width] = mask.pixels
@@ -165,7 +165,7 @@ class Rectification:
         return MaskPx(box.x_min, box.y_min, seen[box.window(area.x_min, area.y_min)])
 
     def points(self, points_px: se3.Array) -> se3.Array:
-        """Image points [..., 2] in the new image, also beside it; NaN where it has none."""
+        """Image points [..., 2] in the new image, or outside it; NaN where it has none."""
         return self.target.project(self.source.rays(points_px))
 
     def shows(self, points_px: se3.Array) -> NDArray[np.bool_]:
@@ -273,22 +273,23 @@ def rectified_truth(
 ) -> ImageTruth:
     """The annotations of an image as they are of its rectified image.
 
-    What follows from pixels is computed from the rectified masks. Silhouettes are known inside the
+    Annotations derived from pixels are computed from the rectified masks. Silhouettes are known
+    inside the
     original image, from ``amodal_mask``: shares of silhouettes are exact for objects that the
-    original does not truncate; of others, the part beside the original counts in proportion.
+    original does not truncate; of others, the part outside the original counts in proportion.
     Without amodal masks, the hidden part of an object counts in proportion to its visible one.
 
     Args:
-        truth: Of the original image, with instance masks.
+        truth: Annotations of the original image, with instance masks.
         scene: At the image's instant.
         bent: Map of its camera.
         thresholds: For listing objects, as in the original.
         parts: Rectified part ids [height, width]; None = not known, then ``part_px`` is None.
 
     Returns:
-        The annotations without those that the original image alone supports: sentences
-        (``utterances``) and written text (``texts``). Results of third-party annotators
-        (``extra``) are those of the original.
+        The annotations, except sentences (``utterances``) and written text (``texts``), which hold
+        for the original image only. Results of third-party annotators (``extra``) are the
+        original's.
     """
     camera = replace(truth.camera, intrinsics=bent.target)
     masks = {t.instance.instance_id: bent.mask(t.mask) for t in truth.objects if t.mask is not None}
@@ -339,7 +340,7 @@ def rectified_truth(
 
 
 def rectified_tracks(tracks: SensorTracks, bent: Rectification) -> SensorTracks:
-    """Tracked points in the new image; those beside it are outside or behind."""
+    """Tracked points in the new image; points outside it are ``outside`` or ``behind``."""
     image_px = bent.points(tracks.image_px.astype(np.float64))
     state = tracks.state.copy()
     state[~bent.shows(image_px)] = TRACK_STATES.index("outside")

@@ -31,9 +31,9 @@ def finish_view(
     Args:
         scene: The view as drawn.
         assets: Meshes of its bodies.
-        category_ids: Of all categories.
-        before: Another view as drawn, and finished. What both have is not measured again, and is
-            the same object in both, which renderers pack once.
+        category_ids: Ids of all categories, by name.
+        before: Another view as drawn, and finished. Bodies and instances that both share are not
+            measured again, and are the same objects in both, which renderers pack once.
     """
     if scene.relief is None:
         return place_sensors(scene)

@@ -31,8 +31,8 @@ class Splits(Strict):
     test: float = Field(0.1, ge=0, le=1, description="Share for tests after training.")
     assign: Assignment = Field(
         "random",
-        description="random: every scene draws its split; round_robin: splits take turns, so that "
-        "small data sets have scenes in all of them.",
+        description="random: every scene draws its split; round_robin: splits take turns, which "
+        "gives small data sets scenes in all of them.",
     )
 
     @model_validator(mode="before")
@@ -68,7 +68,7 @@ def split_of(
         scene_index: From 0.
         shares: ``{split: share}`` in order; shares sum to 1.
         assignment: Method of assignment.
-        seed: Of the data set.
+        seed: Seed of the data set.
     """
     if assignment == "round_robin":
         count = _FIRST_BLOCK
@@ -89,12 +89,12 @@ def warn_of_empty_splits(
     """Warn with a ConfigWarning if a split that should have a scene has none.
 
     Args:
-        scene_count: Of the data set.
+        scene_count: Number of scenes of the data set.
         shares: See ``split_of``, as the next two.
         assignment: Method of assignment.
-        seed: Of the data set.
-        stated: Whether the user has asked for splits: then each should have a scene, otherwise
-            those whose share is a whole scene.
+        seed: Seed of the data set.
+        stated: Whether the user has set splits: then each should have a scene, otherwise each whose
+            share is a whole scene.
     """
     expected = {name for name, share in shares.items() if stated or share * scene_count >= 1.0}
     used: set[str] = set()

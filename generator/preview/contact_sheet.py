@@ -50,7 +50,7 @@ def make_tiles(
         channels: Channels of every camera.
         labels: Whether to draw labels on colour images.
         views: ``module:function`` that draws the readings of a device, by the device's name.
-        width_px: Width of a tile, for lines and names of a legible size; 0 = that of the image.
+        width_px: Width of a tile, for lines and names of a legible size; 0 = the image's width.
     """
     ways = _Ways()
     for sample in samples:

@@ -18,7 +18,7 @@ def draw_borders(image: Image, borders: Sequence[BorderTruth], unit: float = 1.0
 
     Args:
         image: The photograph.
-        borders: Of its camera.
+        borders: Borders of its camera.
         unit: As of ``draw_labels``.
     """
     parts = [(seen, b.kind, line) for b in borders for seen, line in split_border(b)]

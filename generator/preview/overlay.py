@@ -45,10 +45,10 @@ def draw_labels(
 ) -> Image:
     """Draw labels on the RGB image, uint8 [h, w, 3].
 
-    What surrounds the scene, walls and floors, is outlined and named only.
+    Surroundings of the scene, such as walls and floors, are outlined and named only.
 
     Args:
-        reading: Of the camera.
+        reading: Reading of the camera.
         truth: Its labels.
         unit: Width of lines [px]; names have ten times its height. For an image that is shown at a
             third of its size, 3.
@@ -232,7 +232,7 @@ def _in_front(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any] | None:
 
 
 def _surrounds(image: Image, item: sample.ObjectTruth) -> bool:
-    """Whether a tint would colour the scene rather than a thing in it."""
+    """Whether a tint would colour the scene rather than an object in it."""
     fills = item.visible_px > SURROUNDING_SHARE * image.shape[0] * image.shape[1]
     return fills or item.instance.category in SURROUNDINGS
 

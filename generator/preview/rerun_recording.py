@@ -62,7 +62,7 @@ WAY_M = 0.1
 
 @dataclass
 class Recorder:
-    """Writes samples to one recording stream; remembers what it has already sent.
+    """Writes samples to one recording stream; remembers the data already sent.
 
     Attributes:
         stream: Recording to write to.
@@ -345,7 +345,7 @@ def _layout(info: interfaces.DatasetInfo, first: Sample) -> rrb.Blueprint:
 
 
 def _eye(sample: Sample) -> rrb.EyeControls3D | None:
-    """An eye that sees what the first camera sees: from outside, a closed room shows its walls."""
+    """The first camera's view: from outside, a closed room shows its walls."""
     if not sample.capture.readings:
         return None
     _, reading = min(sample.capture.readings.items())

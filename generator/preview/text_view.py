@@ -23,11 +23,11 @@ def word_color(word: WordTruth) -> Rgb:
 def draw_texts(image: Image, texts: Sequence[TextTruth], unit: float = 1.0) -> None:
     """Draw words into a photograph, uint8 [h, w, 3], in place.
 
-    Words of which all characters are visible have their quad, others those of visible characters.
+    Fully visible words have their quad, others the quads of visible characters.
 
     Args:
         image: The photograph.
-        texts: Of its camera.
+        texts: Texts of its camera.
         unit: As of ``draw_labels``.
     """
     for word in (word for text in texts for word in text.words):

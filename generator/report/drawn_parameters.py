@@ -1,8 +1,8 @@
-"""Drawn values of all parameters, beside the distributions that the configuration declares.
+"""Drawn values of all parameters, next to the distributions that the configuration declares.
 
-Randomizers are pure functions of (configuration, seed, scene), so that their draws are repeated
-here instead of being kept in every data set: scenes are drawn and settled again, without rendering,
-by distributions that record their values. Repeated scenes are compared with the stored ones.
+Randomizers are pure functions of (configuration, seed, scene). Their draws are repeated here
+instead of being kept in every data set: scenes are drawn and settled again, without rendering, by
+distributions that record their values. Repeated scenes are compared with the stored ones.
 """
 
 import copy
@@ -49,7 +49,7 @@ class Drawn:
     Attributes:
         name: Name of the parameter.
         distribution: The distribution that drew the value.
-        samples: Numbers of the samples that it is for: all of a scene, or those of a view.
+        samples: Numbers of the samples that it applies to: all of a scene, or of a view.
     """
 
     name: str

@@ -24,7 +24,7 @@ def format_page(sets: Sequence[Mapping[str, Any]]) -> str:
     """
     title = " and ".join(str(report["name"]) for report in sets)
     body = (
-        f"<noscript>The report of {escape(title)} needs JavaScript; report.json beside it has "
+        f"<noscript>The report of {escape(title)} needs JavaScript; report.json next to it has "
         "the same figures.</noscript>\n"
         f'<script type="application/json" id="data">{embed_json(sets)}</script>\n'
         f"<script>{SCRIPT}</script>"
@@ -38,7 +38,8 @@ def format_document(title: str, body: str, script_digest: str = "") -> str:
     Args:
         title: Plain text.
         body: HTML.
-        script_digest: Of the only script that may run, as in a content security policy; empty =
+        script_digest: Digest of the only script that may run, as in a content security policy;
+            empty =
             none may.
     """
     script = f"script-src '{script_digest}'; " if script_digest else ""

@@ -95,7 +95,7 @@ def measure_look(grey: NDArray[np.uint8]) -> Look:
 
 
 def group_duplicates(files: Sequence[ImageFile], hashes: Sequence[int]) -> list[DuplicateGroup]:
-    """Groups of near-duplicates from at least two scenes, those of most images first.
+    """Groups of near-duplicates from at least two scenes, in falling order of images.
 
     Views and instants of one scene look alike by design and make no group by themselves.
     """
@@ -119,8 +119,7 @@ def group_duplicates(files: Sequence[ImageFile], hashes: Sequence[int]) -> list[
 def _near_pairs(unique: NDArray[np.uint64]) -> Iterator[tuple[int, int]]:
     """Pairs of hashes at most ``DISTANCE_MAX`` bits apart, some of them repeatedly.
 
-    Such hashes agree in at least one of the bands, so that only hashes with an equal band are
-    compared.
+    Such hashes agree in at least one of the bands: only hashes with an equal band are compared.
     """
     width = 64 // BANDS
     for band in range(BANDS):

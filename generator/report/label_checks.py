@@ -119,7 +119,7 @@ def _mask_area(_: ImageLabels, item: Item) -> Iterator[str | None]:
 
 
 def _visible_in_amodal(_: ImageLabels, item: Item) -> Iterator[str | None]:
-    """The box of visible pixels is not inside that of the whole silhouette."""
+    """The box of visible pixels is not inside the box of the whole silhouette."""
     box, whole = item.get("box"), item.get("amodal_box")
     if box is None or whole is None:
         return

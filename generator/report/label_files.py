@@ -1,7 +1,7 @@
 """Streams of the labels of an exported data set (COCO's, or else KITTI's) and of KITTI's scans.
 
 COCO files are read line by line, with an image or annotation per line as
-``gen_data.exporters.coco`` writes them, so that memory does not grow with the data set.
+``gen_data.exporters.coco`` writes them: memory does not grow with the data set.
 """
 
 import json

@@ -15,10 +15,10 @@ FEW_IMAGES = 5
 
 @dataclass(frozen=True)
 class LabelGaps:
-    """What has no label in a data set that was to have labels.
+    """Sensors and images without labels in a data set that was to have labels.
 
     Attributes:
-        folder: Of the data set.
+        folder: Folder of the data set.
         cameras: Numbers of images of the cameras without any label.
         scanners: Numbers of scans of the laser scanners without a point on a labelled object.
         classes: Classes of the label map without an object, and their categories.
@@ -40,7 +40,7 @@ class LabelGaps:
                 yield (
                     f"0 labels in {count} images of camera '{name}': look at them with gen-data "
                     "contact-sheet, and compare its pose with the scene's, and labels.map with "
-                    "what it shows"
+                    "the categories in view"
                 )
         for name, count in self.scanners.items():
             if count >= FEW_IMAGES:
@@ -56,7 +56,7 @@ class LabelGaps:
 
 
 def find_label_gaps(stored: StoredSamples) -> LabelGaps:
-    """Find what has no label. Reading ends as soon as every sensor has one.
+    """Find sensors and images without labels. Reading ends as soon as every sensor has one.
 
     Labels are visible, annotated objects that the label map of the configuration keeps and does not
     ignore, visible tracked points, visible borders of lanes, and text. A data set without

@@ -47,7 +47,7 @@ Progress = Callable[[str], None]
 
 
 def describe_folder(folder: Path) -> Json:
-    """Statistics of a folder with labels in COCO's or KITTI's format, which is no data set.
+    """Statistics of a folder with labels in COCO's or KITTI's format, not of a data set.
 
     Raises:
         StorageError: no labels are found, or a file does not have the expected layout.
@@ -121,7 +121,7 @@ def describe_dataset(
 
 
 def _label_tables(stored: StoredSamples) -> Iterator[report_tables.Table]:
-    """What has no label, and the classes of exports, if they are not the categories."""
+    """Sensors without labels, and the classes of exports, if they are not the categories."""
     gaps = tuple((line,) for line in find_label_gaps(stored).lines())
     if gaps:
         yield report_tables.Table("Without labels", ("what",), gaps)

@@ -268,7 +268,7 @@ def _beside_kitti(found: Survey) -> Table:
         f"KITTI: the {KITTI_IMAGES} training images of its object benchmark (Geiger et al., CVPR "
         "2012); mean sizes from Frustum PointNets (Qi et al., CVPR 2018)."
     )
-    return Table("Beside KITTI", header, tuple(rows), note)
+    return Table("Compared with KITTI", header, tuple(rows), note)
 
 
 def _drop_missing(column: Column) -> Column:

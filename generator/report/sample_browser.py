@@ -94,9 +94,9 @@ def browser_images(stored: StoredSamples, bytes_max: int) -> list[BrowserImage]:
 
 
 def evenly_spread(count: int) -> Iterator[int]:
-    """Yield all numbers below ``count``, so that those before any other are spread evenly.
+    """Yield all numbers below ``count`` in an order whose every beginning is spread evenly.
 
-    The order is that of van der Corput's sequence in base 2.
+    It is the order of van der Corput's sequence in base 2.
     """
     bits = max(count - 1, 0).bit_length()
     for k in range(1 << bits):

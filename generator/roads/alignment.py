@@ -69,7 +69,7 @@ def lay_out(
     """Places of bends along a road: each in the middle of an equal share of its length.
 
     Args:
-        length_m: Of the road.
+        length_m: Length of the road.
         bends: Radius [m], positive to the left, and turn [rad] of each. Where its share of the road
             is too short, a bend turns less, and then has shorter clothoids or is left out.
         speed_m_s: Usual speed.
@@ -94,7 +94,7 @@ def lay_out(
 
 @lru_cache(maxsize=256)
 def bent_line(length_m: float, curvature_per_m: float, bends: tuple[float, ...]) -> ReferenceLine:
-    """A line from the origin along +X whose curvature is a constant one and that of bends."""
+    """A line from the origin along +X whose curvature is a constant plus the bends' curvature."""
     knots = [(0.0, curvature_per_m)]
     for start, spiral, arc, curvature in unpack(bends):
         ends = (start, start + spiral, start + spiral + arc, start + 2.0 * spiral + arc)

@@ -38,7 +38,7 @@ class RoadShape:
         lanes: Numbers of lanes against and along the road's direction.
         median_m: Width of the strip between the two directions.
         median_kerb_m: Height of the kerbs around that strip; 0 = it is level with the road.
-        bicycle_m, shoulder_m, parking_m: Widths of strips beside the lanes; 0 = none.
+        bicycle_m, shoulder_m, parking_m: Widths of strips next to the lanes; 0 = none.
         bay_angle_deg: Angle of parking bays to the road; 0 = cars park along the kerb.
         kerb_m: Height of the kerbs; 0 = none.
         verge_m, sidewalk_m: Widths of planting strips and of sidewalks beyond them; 0 = none.

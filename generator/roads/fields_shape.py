@@ -1,4 +1,4 @@
-"""Shape of fields beside a road: parcels of crops, with tracks between them."""
+"""Shape of fields next to a road: parcels of crops, with tracks between them."""
 
 from dataclasses import dataclass
 
@@ -38,7 +38,7 @@ class FieldsShape:
         inner_m: Distance from the reference line to their edge.
         depth_m: Width across the road.
         crops: Words of ``CROPS`` to draw from, joined by underscores.
-        seed: Of parcels and textures.
+        seed: Seed of parcels and textures.
     """
 
     length_m: float = 150.0

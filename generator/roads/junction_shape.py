@@ -29,7 +29,7 @@ _ARC_STEP_RAD = math.radians(7.5)
 class ArmsShape(Protocol):
     """Arms from a centre, and kerbs and sidewalks around the corners between them.
 
-    The base of all shapes of intersections; what it cannot derive, they define.
+    The base of all shapes of intersections; subclasses define the rest.
     """
 
     __slots__ = ()

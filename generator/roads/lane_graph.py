@@ -133,7 +133,7 @@ def stations(start_m: float, end_m: float, step_m: float) -> Array:
 
 
 def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
-    """Set the successors of lanes: those that start at a lane's end, in its direction."""
+    """Set the successors of lanes: lanes that start at a lane's end, in its direction."""
     starts = [
         (lane.name, lane.kind, lane.center_m[0], _heading(lane.center_m, 0)) for lane in lanes
     ]

@@ -143,9 +143,9 @@ class LaneRecord:
         border_m: ``t`` of its outer edge by that distance, instead of a width; None = not given.
         height_m: Heights of its inner and outer edge over the road; None = not given.
         marks: Lines on its outer edge from distances on, in order.
-        speeds_m_s: Speed limits of its own from distances on, in order; 0 = the road's.
+        speeds_m_s: The lane's speed limits from distances on, in order; 0 = the road's.
         reversed: Whether traffic runs against the direction of its side.
-        level: Whether it is level, as are those beyond it.
+        level: Whether it is level, as are lanes beyond it.
         predecessor, successor: Lane numbers in the adjacent sections; None = no link.
     """
 
@@ -321,7 +321,7 @@ def read_opendrive(data: bytes, place: str) -> Network:
         road_id = element.get("id", "")
         where = f"{place}: road '{road_id[:40]}'"
         if not road_id or road_id in roads:
-            raise AssetError(f"{where}: its id is missing or taken; give it one of its own")
+            raise AssetError(f"{where}: its id is missing or taken; give it a unique one")
         try:
             roads[road_id] = road = _read_road(element)
             lanes_m += sum(len(x.lanes) * (x.end_m - x.start_m) for x in road.sections)
@@ -355,7 +355,7 @@ def _read_road(element: Element) -> Road:
     length_m = _read_number(element, "length")
     if abs(length_m - line.length_m) > MAX_GAP_M:
         raise ValueError(
-            f"its length is {length_m:g} m, that of its geometry {line.length_m:g} m; correct one"
+            f"its length is {length_m:g} m, its geometry has {line.length_m:g} m; correct one"
         )
     lanes = _require_child(element, "lanes")
     junction = element.get("junction", "-1")

@@ -25,7 +25,7 @@ _READ: Mapping[str, frozenset[str]] = {
 _GROUPS = frozenset({"objects", "signals", "railroad", "surface"})
 """Elements that only hold others."""
 _REMARKS = frozenset({"userData", "dataQuality", "vectorScene"})
-"""Remarks of programs, which are no part of the roads."""
+"""Remarks of programs, which are not part of the roads."""
 
 
 def count_unused(root: Element) -> dict[str, int]:

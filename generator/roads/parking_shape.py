@@ -21,7 +21,7 @@ class ParkingShape:
         bays: Number of bays per row.
         aisles: Number of aisles, each with a row of bays on both sides.
         bay_m: Width and length of a bay (RAR, by sicherestrassen.de: 2.50 m x 5.00 m).
-        aisle_m: Width of an aisle (likewise: 6.00 m for bays at right angles).
+        aisle_m: Width of an aisle (same source: 6.00 m for bays at right angles).
     """
 
     bays: int = 10

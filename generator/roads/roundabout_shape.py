@@ -80,7 +80,8 @@ class RoundaboutShape(ArmsShape):
     def corner_line(self, number: int, offset_m: float) -> Array:
         """Line [n, 2] parallel to the kerb, from the end of an arm to the end of the next one.
 
-        Along the arm, around the corner, along the ring, and likewise back; ``offset_m`` behind the
+        Along the arm, around the corner, along the ring, and back the same way; ``offset_m`` behind
+        the
         kerb's face.
         """
         arms = self.arms_rad()
@@ -132,7 +133,7 @@ def roundabout_lanes(
 ) -> tuple[scene.Lane, ...]:
     """Make a path from every arm around the ring to every other, sidewalks, and crosswalks.
 
-    Paths share the ring; each is a lane of its own, as the turns of a junction are.
+    Paths share the ring; each is a separate lane, as are the turns of a junction.
     """
     arms = len(shape.arms_rad())
     lanes = []

@@ -56,8 +56,8 @@ class Looks:
     """Materials of a shell.
 
     Attributes:
-        accent: Material of the wall of number ``accent_wall``; None = that of the others.
-        splashback: Material behind worktops; None = that of the wall.
+        accent: Material of the wall of number ``accent_wall``; None = the material of the others.
+        splashback: Material behind worktops; None = the wall's material.
         blind_drops: Share of each opening that a blind covers; 0, or none given, = no blind.
     """
 
@@ -232,7 +232,7 @@ class Builder:
             self._add_shell(room, looks[room.name], (pieces or {}).get(room.name, ()))
 
     def add_outlook(self, outlook: Outlook) -> None:
-        """Add what windows show; it has no labels."""
+        """Add the view from windows; it has no labels."""
         ground = Material((1.0, 1.0, 1.0), 1.0, texture=outlook.ground, texture_scale_m=3.0)
         name = f"{self._name}/{OUTSIDE}"
         at = SE3((0.0, 0.0, -outlook.ground_m))
@@ -328,7 +328,7 @@ class Builder:
     def add_pieces(
         self, room: Room, pieces: Sequence[layout.Piece], parts: Mapping[str, tuple[str, str]]
     ) -> None:
-        """Add furniture and things.
+        """Add furniture and small objects.
 
         Args:
             room: The room that they are in.

@@ -1,8 +1,8 @@
 """Floor plans: rooms as rectangles, their walls and the openings in them.
 
-Wall ``k`` of a room is the one on the side of direction ``180 + 90 k`` degrees; what stands with
-its back to it faces ``90 k`` degrees. Places along a wall count from its middle, to the left of
-what faces into the room.
+Wall ``k`` of a room is the one on the side of direction ``180 + 90 k`` degrees; furniture with its
+back to it faces ``90 k`` degrees. Places along a wall count from its middle, to the left as seen
+facing into the room.
 """
 
 import math
@@ -94,7 +94,7 @@ def draw_plan(
 
     Args:
         kind: Type of the room, or ``apartment``.
-        size_m: Ranges of length, width and height; None = those of the type.
+        size_m: Ranges of length, width and height; None = the type's ranges.
         rng: Random stream.
         field: Place of ``kind`` in the configuration, for the error.
 

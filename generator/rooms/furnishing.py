@@ -37,7 +37,7 @@ def furnish(
         options: Ids of assets by family.
         assets: Their extents.
         rng: Random stream.
-        clutter: Factor on the numbers of small things.
+        clutter: Factor on the numbers of small objects.
 
     Raises:
         Conflict: a required piece has no place, or something cannot be reached.

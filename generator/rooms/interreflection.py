@@ -2,8 +2,8 @@
 
 Rooms are boxes of diffuse patches that exchange light by radiosity (Goral et al., "Modeling the
 interaction of light between diffuse surfaces", SIGGRAPH 1984). Furniture takes part as a mean: it
-is in the way of a share of all exchange and reflects what it receives evenly. Open doors pass on
-what arrives at their other side. Values are irradiance over pi, linear RGB [cd/m^2].
+is in the way of a share of all exchange and reflects received light evenly. Open doors pass on the
+light that arrives at their other side. Values are irradiance over pi, linear RGB [cd/m^2].
 """
 
 import math
@@ -54,7 +54,7 @@ class LitRoom:
 
     Attributes:
         low_m, high_m: Corners, world.
-        reflectance: Of each side, linear RGB.
+        reflectance: Reflectance of each side, linear RGB.
         holes: Windows and doors.
         furniture: Share of the paths between sides that end on furniture.
     """
@@ -73,8 +73,9 @@ class _Patches:
     Attributes:
         centers_m, inward, half_m: Centres, normals and half extents, [n, 3].
         side, area_m2: Numbers of their sides, and areas, [n].
-        factors: Share of each patch j in what patch i receives, [n, n]; rows sum to 1.
-        gather: Share of each patch in what probes receive from around each axis, [probes, 6, n].
+        factors: Share of each patch j in the light that patch i receives, [n, n]; rows sum to 1.
+        gather: Share of each patch in the light that probes receive around each axis,
+            [probes, 6, n].
         counts: Numbers of probes along X, Y and Z, of which Z is fastest.
     """
 
@@ -91,7 +92,7 @@ class _Patches:
 def find_interreflection(
     rooms: Sequence[LitRoom], lights: Sequence[Light]
 ) -> tuple[IrradianceVolume, ...]:
-    """Light from the surfaces of each room; that of lamps and windows themselves is left out."""
+    """Light from the surfaces of each room; direct light of lamps and windows is left out."""
     patches = [_patches_of(tuple(np.subtract(r.high_m, r.low_m).tolist())) for r in rooms]
     cover = [_cover(room, p) for room, p in zip(rooms, patches, strict=True)]
     walls = [_reflectance(room, p, c) for room, p, c in zip(rooms, patches, cover, strict=True)]
@@ -130,7 +131,7 @@ def _through_doors(
     covers: Sequence[Array],
     patches: Sequence[_Patches],
 ) -> Array:
-    """What the holes of a room send into it, [n, 3]: what arrives at their other sides."""
+    """Light that the holes of a room send into it, [n, 3], as it arrives at their other sides."""
     sent = np.zeros((cover.shape[1], 3))
     for hole, share in zip(room.holes, cover, strict=True):
         if hole.twin is not None:
@@ -142,7 +143,7 @@ def _through_doors(
 
 
 def _reflectance(room: LitRoom, patches: _Patches, cover: Array) -> Array:
-    """Reflectance of patches, [n, 3]: of their sides, less that of what holes cover and pass."""
+    """Reflectance of patches, [n, 3]: of their sides, less the part that holes cover and pass."""
     walls: Array = np.array(room.reflectance)[patches.side]
     for hole, share in zip(room.holes, cover, strict=True):
         left = _GLASS if hole.twin is None else 1.0 - hole.passes
@@ -166,7 +167,7 @@ def _cover(room: LitRoom, patches: _Patches) -> Array:
 
 
 def _direct(room: LitRoom, patches: _Patches, lights: Sequence[Light]) -> Array:
-    """What patches receive from the lights that are in the room or shine in, [n, 3]."""
+    """Light that patches receive from the lights in the room or shining in, [n, 3]."""
     middle = 0.5 * np.add(room.low_m, room.high_m)
     total = np.zeros((len(patches.side), 3))
     for light in lights:
@@ -269,7 +270,7 @@ def _counted(length_m: float, wanted_m: float, limits: tuple[int, int]) -> int:
 
 
 def _solid_angles(points_m: Array, centers_m: Array, inward: Array, area_m2: Array) -> Array:
-    """Solid angles of patches from points, [points, n]; those of discs, which stay bounded.
+    """Solid angles of patches from points, [points, n]; solid angles of discs, which stay bounded.
 
     Source: Wallace et al., "A ray tracing algorithm for progressive radiosity", SIGGRAPH 1989.
     """

@@ -28,7 +28,7 @@ _CROWDED = 0.25
 _SILL_M = 0.026
 """Height of sills below the openings of windows."""
 _OFF_SILLS_M = 0.005
-"""Distance that things keep from sills."""
+"""Distance of objects from sills."""
 _TOP_M = 0.003
 """Depth of the rounded border of tops."""
 _EDGE_OF_TOP_M = 0.008
@@ -41,12 +41,12 @@ class Piece:
     """A placed piece.
 
     Attributes:
-        role: Its name in the rules; ``thing`` for small things.
+        role: Its name in the rules; ``thing`` for small objects.
         position_m, yaw_rad: Pose of its frame, world, Z up.
         footprint: Rectangle that it covers, world.
         low_m, high_m: Heights between which it extends.
         on: Index of the piece that carries it; -1 = none.
-        rest: Turn of its own frame, before ``yaw_rad``, with which it lies on a level surface.
+        rest: Turn of its frame, before ``yaw_rad``, with which it lies on a level surface.
     """
 
     role: str
@@ -102,7 +102,7 @@ class Shape:
     """Bounds of an asset at rest [m]: middle of its footprint, half extents, lowest and highest.
 
     Attributes:
-        rest: Turn of its own frame with which it lies on a level surface; None if there is none.
+        rest: Turn of its frame with which it lies on a level surface; None if there is none.
     """
 
     x: float
@@ -337,7 +337,7 @@ class Layout:
     def before_opening(
         self, opening: floor_plan.Opening, reach_m: float = _CROWDED, beside_m: float = 0.0
     ) -> Rectangle:
-        """The floor just before an opening, and beside that."""
+        """The floor just before an opening, and next to that."""
         x, y = self.room.at_wall(opening.wall, opening.along_m, 0.5 * reach_m)
         c, s = floor_plan.direction(opening.wall)
         return (x, y, c, s, 0.5 * reach_m, 0.5 * opening.width_m + beside_m)

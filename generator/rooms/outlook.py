@@ -1,4 +1,4 @@
-"""What windows show: ground, houses, trees and hedges around a building, in true size."""
+"""Views from windows: ground, houses, trees and hedges around a building, in true size."""
 
 import math
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ def outlook_assets() -> tuple[str, ...]:
 
 
 def draw_outlook(rooms: Sequence[Room], rng: streams.Rng) -> Outlook:
-    """Draw houses around the rooms and greenery before them, each in a sector of its own."""
+    """Draw houses around the rooms and greenery before them, each in a separate sector."""
     radius_m = outer_radius_m(tuple(rooms))
     storey = draw_count(rng, (0, 3)) if rooms[0].kind != "warehouse" else 0
     ground_m = _STEP_M + storey * _STOREY_M

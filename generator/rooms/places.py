@@ -19,9 +19,9 @@ WALL_GAP_M = 0.012
 """Gap behind pieces with their back to a wall: the thickness of a skirting board."""
 _TRIES = 36
 _HANGS_M = 0.3
-"""What begins higher than this above the floor hangs on a wall."""
+"""Pieces whose lowest point is above this height over the floor are wall-mounted."""
 _LONG_LIST = 6
-"""Number of families from which on a rule means different things, not many of a kind."""
+"""Number of families from which on a rule means different objects, not many of a kind."""
 
 Placement = tuple[float, float, float, float]
 """Offset along depth and width of a piece [m], turn [rad], and height of the lowest point [m]."""
@@ -102,7 +102,7 @@ def _hanging_m(layout: Layout, rule: Rule, s: Shape) -> float:
 
 
 def _free(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
-    """Anywhere on the floor: furniture square to the walls, small things at any angle."""
+    """Anywhere on the floor: furniture square to the walls, small objects at any angle."""
     placed = 0
     (mx, my), (sx, sy, _) = layout.room.center_m, layout.room.size_m
     for _ in range(wanted):
@@ -172,7 +172,7 @@ def _in_front(layout: Layout, ref: Piece, s: Shape, gap_m: float) -> Placement:
 
 
 def _at_side(layout: Layout, ref: Piece, s: Shape, gap_m: float) -> Placement:
-    """Beside a piece, aligned with its back; next to a hanging piece at the same height."""
+    """Next to a piece, aligned with its back; next to a hanging piece at the same height."""
     a, b = ref.footprint[4:]
     side = 1 if layout.rng.random() < 0.5 else -1
     hangs = ref.low_m > _HANGS_M

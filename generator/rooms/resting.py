@@ -1,4 +1,4 @@
-"""Poses in which things rest on a level surface, by their convex hulls.
+"""Poses in which objects rest on a level surface, by their convex hulls.
 
 A rigid body rests on a facet of its convex hull if its centre of mass is above that facet (Goldberg
 et al., "Part pose statistics", IEEE Transactions on Robotics and Automation 15, 1999). That is so
@@ -20,7 +20,7 @@ def turn_to_rest(points_m: Array) -> Quaternion | None:
     """A small turn (w, x, y, z) after which a body of even density rests; None if there is none.
 
     Of the facets within ``STEEPEST`` of below, the one that has the centre of mass lowest: round
-    things roll on from all others.
+    objects roll on from all others.
 
     Args:
         points_m: Points [n, 3] whose convex hull is the body's.

@@ -1,4 +1,4 @@
-"""Rules of rooms: what belongs into a room of a type, where, and how much space it needs."""
+"""Rules of rooms: contents of a room of a type, their places, and the space that they need."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -25,17 +25,17 @@ class Rule:
         of: Pieces that it refers to.
         gap_m: Distance from that piece [m].
         clearance_m: Depth of free floor before its front [m].
-        height_m: Height of its lowest point, for what hangs [m].
+        height_m: Height of its lowest point, for wall-mounted pieces [m].
         middle_m: Height of its middle, instead of ``height_m`` [m].
         at: Place on the top that carries it, from -1 to 1 along depth and width.
         matching: Whether all matching pieces of a room have one look.
-        optional: Whether a room may do without it, whatever ``count`` says.
+        optional: Whether a room may do without it, despite ``count``.
         movable: Whether a person moves it out of the way.
         clutter: Whether ``clutter`` of the randomizer scales its number.
-        things: Families of small things on it.
+        things: Families of small objects on it.
         how_many: Smallest and largest number of them per surface.
-        filled: Share of its boards that things cover, side by side; 0 = ``how_many`` lie about.
-        inside: Families of things on the boards behind its doors, at most one per board.
+        filled: Share of its boards that objects cover, side by side; 0 = ``how_many`` lie about.
+        inside: Families of objects on the boards behind its doors, at most one per board.
     """
 
     piece: str
@@ -66,8 +66,8 @@ class RoomType:
         size_m: Ranges of length, width and height [m].
         windows: Smallest and largest number of windows.
         floor, walls: Families of textures; ``paint`` is tinted.
-        accent: Those of a single wall that stands out; in a share of the rooms.
-        splashback: Those behind worktops.
+        accent: Textures of a single wall that stands out; in a share of the rooms.
+        splashback: Textures behind worktops.
         pieces: Rules in the order of placing.
         pale: Whether its walls are always near white.
         blinds: Whether its windows may have blinds.
@@ -111,7 +111,7 @@ class RoomType:
 
 @cache
 def room_types() -> dict[str, RoomType]:
-    """Types by name: shipped ones, and those of the entry points ``gen_data.room_type``.
+    """Types by name: shipped ones, and types of the entry points ``gen_data.room_type``.
 
     Raises:
         ConfigError: an entry point is not a RoomType.

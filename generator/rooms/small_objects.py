@@ -14,15 +14,15 @@ from gen_data.rooms.layout import Layout, Options, Piece, Shape, cos_sin
 _BORDER_M = (0.05, 0.05)
 """Width of the border of surfaces that stays free, in depth and width."""
 _SQUARE_SHARE = 0.4
-"""Share of things on tables that lie square to them."""
+"""Share of objects on tables that lie square to them."""
 _TRIES_ON = 6
 _FULL = 0.97
-"""Largest share of a board that things cover."""
+"""Largest share of a board that objects cover."""
 
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """A level surface of a piece that carries things.
+    """A level surface of a piece that carries objects.
 
     Attributes:
         height_m: World height.
@@ -39,7 +39,7 @@ class Support:
 
 
 def supports(piece: Piece, assets: AssetIndex) -> list[Support]:
-    """Surfaces of a piece that carry things."""
+    """Surfaces of a piece that carry objects."""
     height, half = piece.high_m - piece.low_m, piece.footprint[4:]
     corners = [k.position_m for k in assets.keypoints(piece.asset) if k.name == SUPPORT]
     if corners:
@@ -79,7 +79,7 @@ def _insides(piece: Piece, assets: AssetIndex) -> list[Support]:
 
 
 def put_small_objects(layout: Layout, rule: rules.Rule, options: Options, clutter: float) -> None:
-    """Small things on the surfaces of all pieces of a rule, apart from one another."""
+    """Small objects on the surfaces of all pieces of a rule, apart from one another."""
     for k, piece in enumerate(list(layout.pieces)):
         if piece.role != rule.piece or piece.on >= 0 or piece.family not in rule.assets:
             continue
@@ -111,7 +111,7 @@ def _put_thing(
     support: Support,
     near: Sequence[Piece],
 ) -> Piece | None:
-    """A thing on a surface of piece k; None if there is no place for it."""
+    """An object on a surface of piece k; None if there is no place for it."""
     family = layout.pick(things)
     asset = layout.pick(options[family])
     s = layout.shape(asset)
@@ -145,7 +145,7 @@ def _fill_board(
     near: list[Piece],
     clutter: float,
 ) -> None:
-    """Things side by side on a board, from one end on, near its front edge."""
+    """Objects side by side on a board, from one end on, near its front edge."""
     share = min(floor_plan.between(layout.rng, rule.filled) * clutter, _FULL)
     end = support.half_m[1] * (2.0 * share - 1.0)
     side = 1.0 if layout.rng.random() < 0.5 else -1.0
@@ -172,13 +172,13 @@ def _fill_board(
 
 
 def _fits(layout: Layout, s: Shape, support: Support) -> bool:
-    """Whether a thing stands and is low enough for what is above a surface."""
+    """Whether an object stands and fits below the next surface above."""
     clearance_m = min(support.clearance_m, layout.room.size_m[2] - support.height_m)
     return s.rest is not None and s.high - s.low <= clearance_m
 
 
 def _reach(s: Shape, turn_rad: float) -> tuple[float, float]:
-    """Half extents of a turned thing along depth and width of its surface [m]."""
+    """Half extents of a turned object along depth and width of its surface [m]."""
     c, sn = abs(math.cos(turn_rad)), abs(math.sin(turn_rad))
     return s.half_x * c + s.half_y * sn, s.half_x * sn + s.half_y * c
 
@@ -192,7 +192,7 @@ def _thing_at(
     at_m: tuple[float, float],
     turn_rad: float,
 ) -> Piece:
-    """A thing on a surface of piece k, ``at_m`` from the surface's middle."""
+    """An object on a surface of piece k, ``at_m`` from the surface's middle."""
     carrier, height = layout.pieces[k], support.height_m
     x, y, c, sn, _, _ = carrier.footprint
     s = layout.shape(asset)

@@ -11,20 +11,20 @@ from gen_data.rooms.interreflection import AXES, Hole, LitRoom
 _SILL_M = 0.06
 """Reach into the room: sills stand out of the wall by 0.05 m."""
 _REVEAL_M = 0.005
-"""Beyond the hole, so that its own sides count."""
+"""Beyond the hole, for its own sides to count."""
 _ASIDE = 0.3
-"""Share of outdoors in what surfaces across the wall receive; frames hide some of the half."""
+"""Share of outdoors in the light on surfaces across the wall; frames hide some of the half."""
 
 
 def find_niches(
     rooms: Sequence[LitRoom], volumes: Sequence[IrradianceVolume], outside_cd_m2: Vec3
 ) -> tuple[IrradianceVolume, ...]:
-    """The volumes of all windows, which replace those of their rooms.
+    """The volumes of all windows, which replace their rooms' volumes there.
 
     Args:
         rooms: The rooms.
         volumes: Light in each of them.
-        outside_cd_m2: Mean of what the windows show, linear RGB.
+        outside_cd_m2: Mean luminance of the view from the windows, linear RGB.
     """
     return tuple(
         _niche(hole, np.array(volume.light_cd_m2).reshape(-1, 6, 3).mean(axis=0), outside_cd_m2)

@@ -1,7 +1,7 @@
 """Card and metadata at the root of every data set: ``README.md`` and ``croissant.json``.
 
 Both depend on the plan and on the records of shards only. They describe images as sets of files,
-so that their size does not grow with the number of samples.
+which keeps their size independent of the number of samples.
 """
 
 import hashlib
@@ -175,7 +175,7 @@ def _samples_text(facts: DatasetFacts) -> str:
 
 
 def _label_limits(plan: Plan) -> Iterator[str]:
-    """Sentences on what the configuration leaves without annotation, and on its 3D boxes."""
+    """Sentences on the objects that the configuration does not annotate, and on its 3D boxes."""
     given: Mapping[str, Any] = plan.config.get("labels") or {}
     own = {name: given[name] for name in Thresholds.model_fields if name in given}
     limits = Thresholds.model_validate(own)
@@ -270,9 +270,7 @@ def _item_name(item: Any) -> str:
 
 def _licence_text(facts: DatasetFacts) -> str:
     own = facts.info.publication.license
-    lines = [
-        f"The data set: {plain(own)}." if own else "The publisher has stated no licence of its own."
-    ]
+    lines = [f"The data set: {plain(own)}." if own else "The publisher has stated no licence."]
     if facts.asset_licences is not None:
         names = plain(", ".join(facts.licences)) or "none"
         lines.append(
@@ -341,7 +339,7 @@ without gen-data; `shards/*/labels.jsonl` has all annotations as JSON, a line pe
 
 ## Verify
 
-`sha256sum --check --quiet SHA256SUMS` or `gen-data verify --full .`: all files are those that were
+`sha256sum --check --quiet SHA256SUMS` or `gen-data verify --full .`: all files are as they were
 generated. The same configuration, seed and versions give the same bytes.
 
 ## Labels and limits
@@ -351,8 +349,8 @@ generated. The same configuration, seed and versions give the same bytes.
 {thresholds}
 - Cameras have X right, Y down, Z forward; the world has Z up; units are metres, seconds, radians.
 - Ids of instances are the same in all views of a scene. Splits are drawn per scene.
-- The images are synthetic. Distributions of objects, light and viewpoints are those of the
-  configuration, not those of a real place; measure on real data before you rely on a model.
+- The images are synthetic. Distributions of objects, light and viewpoints come from the
+  configuration, not from a real place; measure on real data before you rely on a model.
 - No image shows a real person, and none a real place, except for photographed panoramas and
   scanned assets that the table of assets names.
 

@@ -1,7 +1,7 @@
 """Verification beyond checksums: every sample decoded and checked, some generated again.
 
-Checksums find what changed after a data set was sealed. These checks find what was wrong before:
-invalid labels, and samples that this installation would generate differently.
+Checksums find changes after a data set was sealed. These checks find earlier faults: invalid
+labels, and samples that this installation would generate differently.
 """
 
 import json
@@ -43,10 +43,10 @@ def find_invalid_samples(folder: Path) -> Iterator[verify.Finding]:
 
 
 def _lax_json(stored: StoredSamples, shard: int) -> Iterator[verify.Finding]:
-    """Lines that are no strict JSON: Python also reads NaN and Infinity."""
+    """Lines that are not strict JSON: Python also reads NaN and Infinity."""
 
     def refuse(name: str) -> None:
-        raise ValueError(f"{name} is no JSON")
+        raise ValueError(f"{name} is not JSON")
 
     for name in (provenance.SCENES_NAME, labels.LABELS_NAME):
         path = stored.shard_dir(shard) / name
@@ -88,7 +88,7 @@ def find_irreproducible_samples(
 
     Args:
         folder: A data set; unfinished ones need the shards of the samples.
-        indices: Of the samples.
+        indices: Indices of the samples.
         semantic: Compare decoded contents, not bytes: other releases of encoders are equal then.
         source: See ``plan_regeneration``.
 

@@ -21,7 +21,7 @@ class Comparison:
         samples: Number of samples that both have.
         plan: Differences of the plans, one line per field.
         sample: The first difference of the first sample that differs.
-        file: Path of the first other file that differs: what an exporter wrote.
+        file: Path of the first other file that differs, written by an exporter.
     """
 
     samples: int

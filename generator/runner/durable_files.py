@@ -104,7 +104,7 @@ def move_durably(source: Path, target: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Create a folder and its missing parents durably; existing folders are no error."""
+    """Create a folder and its missing parents durably; existing folders are not an error."""
     missing = []
     while not path.is_dir():
         missing.append(path)

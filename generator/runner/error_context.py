@@ -32,7 +32,7 @@ def explain_errors(place: str, command: str = "") -> Iterator[None]:
 def unexpected_error(error: BaseException, place: str, command: str = "") -> SampleError:
     """Make a SampleError with the end of the traceback, which cannot be pickled itself.
 
-    Lack of memory is one line: a traceback tells nothing about it.
+    Lack of memory is one line: a traceback would not help.
     """
     if lacking := lack_of_memory(error):
         return OutOfMemory(f"{place}: {lacking}")

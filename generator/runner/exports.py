@@ -1,9 +1,9 @@
 """Export of a finished data set in further formats, without a renderer.
 
 It is a run like any other, whose samples are read instead of generated and whose images are linked
-instead of encoded: with the same interruptions, resumption, workers and manifest. Its plan is that
-of the data set with other exporters, so that the result has the same bytes as the data set that
-generation with these exporters gives.
+instead of encoded: with the same interruptions, resumption, workers and manifest. Its plan is the
+data set's plan with other exporters; the result has the same bytes as the data set that generation
+with these exporters gives.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,7 +21,7 @@ from gen_data.runner.run import Settings, run
 from gen_data.runner.stored import RECORDED, CheckedSamples, StoredSamples, check_digest
 
 NEW_BYTES = 8_000.0
-"""Least size of what exports add to a sample: labels, and entries in records and sums."""
+"""Least size of an export's additions to a sample: labels, and entries in records and sums."""
 
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
@@ -32,7 +32,7 @@ class StoredPipeline:
     """A pipeline that reads its samples from a finished data set; picklable.
 
     Attributes:
-        asset_folders: Of the data set's configuration.
+        asset_folders: Asset folders of the data set's configuration.
         has_points: Whether samples have the points of their scans, which exporters do not need.
     """
 
@@ -73,7 +73,7 @@ class StoredPipeline:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Drop what was read."""
+        """Drop the loaded data."""
         self.stored.close()
 
 
@@ -112,8 +112,8 @@ class LinkedFiles:
         """Digests by inode of the files of a shard that exports link.
 
         Raises:
-            StorageError: a file does not have the digest of the shard's record: what exporters
-                made of it is wrong.
+            StorageError: a file does not have the digest of the shard's record: results of
+                exporters from it are wrong.
         """
         found = {}
         folder = self.stored.shard_dir(shard)
@@ -177,13 +177,13 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     progress: Callable[[RunProgress], None] | None = None,
     force: bool = False,
 ) -> Summary:
-    """Write a finished data set in other formats, as a data set of its own.
+    """Write a finished data set in other formats, as a separate data set.
 
     Args:
         stored: The data set.
         config: Its configuration, with these exporters.
         exporters: By name; checked.
-        out: Folder of the new data set. Its shards are hard links to those of the old one, or
+        out: Folder of the new data set. Its shards are hard links to the old one's, or
             copies on another file system.
         workers: See ``run``.
         resume_command: See ``run``.

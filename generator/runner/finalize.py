@@ -35,7 +35,7 @@ def finalize(
     """Merge, summarise and seal a data set whose shards are all committed.
 
     Args:
-        plan: Of the data set.
+        plan: Plan of the data set.
         store: Its folder.
         pipeline: For its exporters and facts.
         licences: Makes the text of ``LICENSES-ASSETS.md``; None = no such file.
@@ -47,7 +47,7 @@ def finalize(
     Raises:
         StorageError: a shard is not committed, or a file cannot be written.
         SampleError: every sample failed.
-        DeterminismError: the result is not what was expected; nothing is sealed.
+        DeterminismError: the result is not as expected; nothing is sealed.
     """
     with store.errors():
         records = _all_records(plan, store)

@@ -25,8 +25,8 @@ class SpaceCheck:
     Attributes:
         estimate_bytes: Size of a sample, estimated from the configuration; 0 = unknown.
         is_forced: Whether only a full disk stops the run.
-        fixed_bytes: Size of the files whose number does not depend on that of the samples.
-        linked_bytes: Of a sample, the size of files that are hard links and take no space.
+        fixed_bytes: Size of the files whose number does not depend on the number of samples.
+        linked_bytes: Size of a sample's files that are hard links and take no space.
     """
 
     store: "LocalStore"

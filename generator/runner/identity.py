@@ -76,7 +76,7 @@ def make_plan(factory: PipelineFactory) -> Plan:
 
 
 def installation_differences(plan: Plan) -> list[str]:
-    """Packages whose release here is not that of the plan, one line each; none if all are equal."""
+    """Packages whose release here differs from the plan's, one line each; none if all are equal."""
     here = {name: release(name) for name in ("gen-data", *BYTES_DEPEND_ON.values())}
     return [
         f"{name}: {wanted} expected, {here[name]} here"

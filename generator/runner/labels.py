@@ -54,7 +54,7 @@ class Labels:
         index, split: See ``Sample``.
         truth: Annotations by camera.
         frame: Annotations of the sample as a whole; None if there are none.
-        images, scans, tables: By sensor, for those with a reading in this sample.
+        images, scans, tables: By sensor, for the sensors with a reading in this sample.
     """
 
     index: int

@@ -55,7 +55,7 @@ def _check_space(plan: Plan, parts: Sequence[Path], store: LocalStore) -> None:
     """Refuse a disk that is too small for the shards that cannot be linked.
 
     Raises:
-        StorageError: with the need, and what is free.
+        StorageError: with the needed and the free space.
     """
     place = nearest_folder(store.root)
     copied = [LocalStore(part) for part in parts if not _is_same_disk(part, place)]

@@ -1,7 +1,7 @@
 """Admission of machines to a data set: all of them must compute alike.
 
-``run/numerics.json`` has one line per class of machines that generated samples. It is no part of
-the data set: its identity is what was generated, not where.
+``run/numerics.json`` has one line per class of machines that generated samples. It is not part of
+the data set, which is identified by its contents, not by its machines.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NUMERICS_NAME = "numerics.json"
 def admit_numerics(job: Job, pipeline: PipelineLike) -> None:
     """Compare this process with the one that began the data set; the first one is recorded.
 
-    Pipelines without ``numerics``, such as those of exports, compute nothing that could differ.
+    Pipelines without ``numerics``, such as pipelines of exports, compute nothing that could differ.
 
     Raises:
         NumericsError: its results differ, and the job does not allow that.
@@ -48,7 +48,7 @@ def admit_numerics(job: Job, pipeline: PipelineLike) -> None:
 
 
 def is_admitted(store: LocalStore, make_pipeline: Callable[[], EnteredPipeline]) -> bool:
-    """Whether this process computes as one of those that generated a data set, or none is known."""
+    """Whether this process computes like one that generated a data set, or none is known."""
     known = _parse(store.read_run_file(NUMERICS_NAME))
     with make_pipeline() as pipeline:
         compute = getattr(pipeline, "numerics", None)
@@ -101,7 +101,7 @@ def _describe(first: Mapping[str, object], entry: Mapping[str, object]) -> str:
     return (
         f"this machine computes differently from the one that began the data set ({kinds}): "
         f"processor was '{first.get('processor', '')}', now '{entry['processor']}'.\n"
-        "  Its samples would differ in their last bits, so that the data set could not be made "
+        "  Its samples would differ in their last bits: the data set could not be made "
         "again on one machine.\n"
         "  Resume on a machine of the first kind, or accept that with --allow-mixed-numerics"
     )

@@ -1,6 +1,6 @@
 """Storage of a data set at a URL: S3, Google Cloud Storage, Azure Blob Storage, by ``fsspec``.
 
-The layout is that of a folder. An object appears as a whole or not at all, so that a shard is
+The layout is the same as in a folder. An object appears as a whole or not at all: a shard is
 committed by single PUTs of its files and then of its record; the manifest comes last. Shards and
 merged files are staged in a local folder, from which they vanish once they are stored.
 
@@ -133,7 +133,7 @@ class ObjectFolder:
         return sizes
 
     def check_name(self, name: str) -> str:
-        """Return a name that is that of a file in a folder.
+        """Return a name if it can name a file in a folder.
 
         Raises:
             StorageError: as a path, it would lead out of the folder.
@@ -276,7 +276,7 @@ class ObjectStore(LocalStore):
         return FolderState.NEW
 
     def _was_sealed_with(self, plan: Plan) -> bool:
-        """Whether the sums are those of this plan, although ``plan.json`` may be damaged."""
+        """Whether the sums belong to this plan, although ``plan.json`` may be damaged."""
         sums = seal.parse_sums(self.read_documents([layout.SUMS_NAME])[layout.SUMS_NAME])
         return sums.digests.get(layout.PLAN_NAME) == hashlib.sha256(plan_bytes(plan)).hexdigest()
 
@@ -381,7 +381,7 @@ class ObjectStore(LocalStore):
             self.objects.put(name, record.to_bytes())
 
     def quarantine_damaged(self, plan: Plan, shards: Iterable[int]) -> list[int]:
-        """Hash the objects of these shards, and remove the records of those that differ.
+        """Hash the objects of these shards, and remove records that do not match.
 
         Returns:
             The damaged shards.
@@ -508,7 +508,7 @@ def fetch_shard(objects: ObjectFolder, record: ShardRecord, folder: Path) -> Non
     for file in record.files:
         if hash_file(folder / file.path) != file.sha256:
             raise StorageError(
-                f"{objects.url}/{prefix}/{file.path}: its sha256 is not that of the shard's "
+                f"{objects.url}/{prefix}/{file.path}: its sha256 differs from the shard's "
                 "record. The command that made the data set replaces the shard"
             )
 

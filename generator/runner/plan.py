@@ -20,7 +20,7 @@ Since version 2, records have checksums, and records and manifest list empty fol
 READABLE_VERSIONS = (1, FORMAT_VERSION)
 
 DAMAGE = (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
-"""What reading a damaged JSON file into typed values may raise."""
+"""Exceptions that reading a damaged JSON file into typed values may raise."""
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ class Pool(Protocol):
 
 
 class StandbyWorker:
-    """A worker that imports and loads what most jobs need, while its job is still being planned.
+    """A worker that imports and loads the needs of most jobs, while its job is still being planned.
 
     A context manager: without a job, the process does not outlive it.
 
@@ -123,7 +123,7 @@ class WorkerPool:
     """The worker processes of one run. A context manager: leaves no process behind.
 
     Args:
-        job: What the workers do.
+        job: Work of the workers.
         logs: Folder for the output of workers, one file per worker.
         standby: Becomes the first worker.
     """

@@ -25,7 +25,7 @@ class RunProgress:
 
     Attributes:
         phase: ``samples``, ``checking`` or ``merging``.
-        done: Existing samples, including those of earlier runs and of unfinished shards.
+        done: Existing samples, including samples of earlier runs and of unfinished shards.
         total: Samples of the data set.
         samples_per_s: Mean rate of this run; 0 until the first sample.
         rejections: Layouts rejected so far, in committed shards.

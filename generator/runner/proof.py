@@ -14,7 +14,7 @@ class Proof:
     """Digests of a data set that is made again.
 
     Attributes:
-        dataset_id: Of the whole.
+        dataset_id: Digest of the whole.
         shards: SHA-256 of the records of all shards; empty = not known.
         labels: SHA-256 of the labels of all shards; empty = not known.
         files: ``{path: sha256}`` of some files outside of shards.

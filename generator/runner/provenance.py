@@ -71,7 +71,7 @@ def _list_text(items: Sequence[object]) -> str:
 
 
 def _object_text(texts: Mapping[str, str]) -> str:
-    """Canonical JSON of an object, from that of its values."""
+    """Canonical JSON of an object, from the canonical JSON of its values."""
     return "{" + ",".join(f'"{name}":{texts[name]}' for name in sorted(texts)) + "}"
 
 

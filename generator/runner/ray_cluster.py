@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RayCluster:
-    """A cluster and what one worker takes of it; picklable.
+    """A cluster and one worker's share of it; picklable.
 
     Attributes:
         address: ``auto`` = the cluster of this machine, ``HOST:PORT``, or empty = start one of

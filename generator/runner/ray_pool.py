@@ -47,10 +47,10 @@ class _Actor:
 class RayPool:
     """The workers of one run on the connected cluster. A context manager: leaves no actor behind.
 
-    Actors wait for resources, so that an autoscaler sees what is missing.
+    Actors wait for resources, which shows an autoscaler the missing ones.
 
     Args:
-        job: What the workers do; its folder exists on all machines, or is a URL.
+        job: Work of the workers; its folder exists on all machines, or is a URL.
         cpus: CPU cores per worker.
         gpus: GPUs per worker.
     """

@@ -1,7 +1,7 @@
 """Worker on a machine of a Ray cluster: an actor that generates one shard per task.
 
-Its tasks are streams of batches of events, so that the driver sees progress and signs of life
-before a shard is finished.
+Its tasks are streams of batches of events: the driver sees progress and signs of life before a
+shard is finished.
 """
 
 import faulthandler
@@ -44,7 +44,7 @@ class ShardWorker:
     All work is done in one thread, because engines belong to the thread that starts them.
 
     Args:
-        number: Of the worker.
+        number: Number of the worker.
         job: A pickled ``Job``.
     """
 
@@ -57,7 +57,7 @@ class ShardWorker:
         threading.Thread(target=self._serve, daemon=True).start()
 
     def start(self) -> Iterator[Sequence[Event | Placed]]:
-        """Start the engines. The first batch tells that the worker has a machine."""
+        """Start the engines. The first batch signals that the worker has a machine."""
         import ray
 
         yield [Placed(self._number, ray.get_runtime_context().get_node_id())]

@@ -293,7 +293,7 @@ class RecipeFile:
         """Its configuration.
 
         Args:
-            places: Other folders of assets than those in the recipe's folder, by their names.
+            places: Folders that replace asset folders in the recipe's folder, by their names.
 
         Raises:
             ConfigError: it is not valid here.

@@ -24,10 +24,10 @@ from gen_data.runner.stored import StoredSamples
 
 @dataclass(frozen=True)
 class Regeneration:
-    """What makes a data set again.
+    """The means to make a data set again.
 
     Attributes:
-        plan: That of this installation: its versions may differ from those of the data set.
+        plan: This installation's plan: its versions may differ from the data set's.
         make_pipeline: Makes the pipeline in any process.
         licences: Formats the licences of assets.
         changes: Differences of ``plan`` from the plan of the data set, one line per field; without
@@ -44,8 +44,8 @@ def plan_regeneration(folder: Path, plan: Plan, source: Path | None = None) -> R
     """Plan to make the samples of a data set again.
 
     Args:
-        folder: Of the data set, for messages.
-        plan: Of the data set.
+        folder: Folder of the data set, for messages.
+        plan: Plan of the data set.
         source: The data set whose scenes were rendered again, if it was made like that.
 
     Raises:
@@ -61,7 +61,7 @@ def plan_regeneration(folder: Path, plan: Plan, source: Path | None = None) -> R
     wanted, _, redrawn = plan.scenes_of.partition(" ")
     if source is None:
         raise ConfigError(
-            f"{folder}: its scenes are those of another data set, {wanted[:16]}, which is needed "
+            f"{folder}: its scenes come from another data set, {wanted[:16]}, which is needed "
             "to make its samples again; name its folder with --source"
         )
     stored = StoredSamples(source)
@@ -113,7 +113,7 @@ def write_alone(pipeline: PipelineLike, index: int, folder: Path) -> SampleFiles
 
 
 def refuse_changes(folder: Path, changes: tuple[str, ...], purpose: str) -> None:
-    """Refuse to go on if this installation makes other bytes than those of the data set.
+    """Refuse to go on if this installation makes other bytes than the data set's.
 
     Raises:
         StorageError: names the differences.

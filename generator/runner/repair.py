@@ -1,4 +1,4 @@
-"""Repair of what is not a shard: the plan, and files that do not belong to the data set.
+"""Repair of everything but shards: the plan, and files that do not belong to the data set.
 
 Damaged shards need nothing special: a run generates all shards that do not match their records.
 """
@@ -30,12 +30,12 @@ def read_declared_plan(store: LocalStore) -> bytes | None:
 
 
 def restore_plan(store: LocalStore, plan: Plan) -> None:
-    """Replace a damaged or missing ``plan.json`` by ``plan``, if that is what it was.
+    """Replace a damaged or missing ``plan.json`` by ``plan``, if it was the same.
 
-    Changes nothing if the folder is not a data set of this plan: the run says so then.
+    Changes nothing if the folder is not a data set of this plan: the run then raises the error.
 
     Raises:
-        StorageError: the file is damaged, and ``plan`` is not what it was.
+        StorageError: the file is damaged, and ``plan`` is another one.
     """
     path, data = store.root / layout.PLAN_NAME, plan_bytes(plan)
     current = seal.read_or_empty(path)
@@ -49,8 +49,8 @@ def restore_plan(store: LocalStore, plan: Plan) -> None:
         return
     if hashlib.sha256(data).hexdigest() not in declared:
         raise StorageError(
-            f"{path}: damaged or missing, and the configuration and --n are not those of this data "
-            "set; nothing was changed. Repeat the command with the ones that it was made with"
+            f"{path}: damaged or missing, and the configuration and --n are not this data set's; "
+            "nothing was changed. Repeat the command with the ones that it was made with"
         )
     with store.locked(), store.errors():
         if os.path.lexists(path):

@@ -1,7 +1,7 @@
 """The scenes of a finished data set, rendered again with other sensors, weather or light.
 
 Objects keep their ids, shapes and poses; randomizers that are not changed are not drawn again. The
-two data sets are pairs: they differ in nothing but what was changed (counterfactual images).
+two data sets are pairs: they differ in the changes only (counterfactual images).
 """
 
 import warnings
@@ -37,10 +37,10 @@ class RerenderFactory:
 
     Attributes:
         stored: The finished data set.
-        factory: Of the changed configuration.
-        changed_sensors: Names of the sensors that are not those of the data set.
+        factory: Factory of the changed configuration.
+        changed_sensors: Names of the sensors that differ from the data set's.
         redrawn: Names of the randomizers to draw again, on top of the stored scenes.
-        detached: Names of the shared values that no longer state what the scenes show.
+        detached: Names of the shared values that no longer describe the scenes.
     """
 
     stored: StoredSamples
@@ -56,7 +56,7 @@ class RerenderFactory:
 
 @dataclass(frozen=True)
 class RerenderedScenes:
-    """A pipeline whose scenes are those of a finished data set."""
+    """A pipeline with the scenes of a finished data set."""
 
     plan: RerenderFactory
     pipeline: Pipeline
@@ -77,7 +77,7 @@ class RerenderedScenes:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Drop what was read."""
+        """Drop the loaded data."""
         self.plan.stored.close()
 
     def numerics(self) -> Mapping[str, str]:
@@ -188,7 +188,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
     progress: Callable[[RunProgress], None] | None = None,
     force: bool = False,
 ) -> Summary:
-    """Render the scenes of a finished data set again, as a data set of its own.
+    """Render the scenes of a finished data set again, as a separate data set.
 
     Args:
         stored: The data set.
@@ -236,7 +236,7 @@ def _absent(stored: StoredSamples) -> tuple[FailedSample, ...]:
 def rerender_plan(
     stored: StoredSamples, was: Config, now: Config, redraw: Sequence[str]
 ) -> tuple[Plan, RerenderFactory]:
-    """Plan of a re-rendering, and what makes its pipelines; arguments as of ``rerender``.
+    """Plan of a re-rendering, and the maker of its pipelines; arguments as of ``rerender``.
 
     Raises:
         ConfigError: see ``rerender``.
@@ -246,7 +246,7 @@ def rerender_plan(
     changes.check(redraw)
     for name in sorted(changes.detached):
         warnings.warn(
-            f"shared.{name}: a randomizer that referred to it has a value of its own now, so that "
+            f"shared.{name}: a randomizer no longer refers to it but has its own value, so "
             f"images no longer have the attribute '{name}'; to change it: --set shared.{name}=...",
             errors.ConfigWarning,
             stacklevel=2,
@@ -268,7 +268,7 @@ def rerender_plan(
 CHANGEABLE = frozenset(
     {"annotations", "dataset", "exporters", "labels", "randomizers", "render", "sensors", "shared"}
 )
-"""Sections in which a configuration may differ from that of the data set."""
+"""Sections in which a configuration may differ from the data set's."""
 
 
 @dataclass(frozen=True)
@@ -296,7 +296,7 @@ class Changes:
     def detached(self) -> frozenset[str]:
         """Names of shared values to which a randomizer of the same name refers no longer.
 
-        Attributes of images are shared values: they would state what the scene does not show.
+        Attributes of images are shared values: they would not describe the scene.
         """
         before, after = _randomizers(self.was), _randomizers(self.now)
         return frozenset(
@@ -323,7 +323,7 @@ class Changes:
         gone = sorted(_randomizers(self.was).keys() - listed)
         if gone:
             raise errors.ConfigError(
-                f"randomizers.{gone[0]}: was drawn into the scenes of the data set, so that it "
+                f"randomizers.{gone[0]}: was drawn into the scenes of the data set and "
                 "cannot be left out; change its settings instead"
             )
         unknown = sorted(set(redraw) - listed)

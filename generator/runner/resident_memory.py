@@ -1,4 +1,4 @@
-"""Memory of this process: reading it, and returning what is not needed to the system.
+"""Memory of this process: reading it, and returning unused memory to the system.
 
 The module imports nothing heavy, because workers import it first. Without Linux's procfs, it does
 nothing.
@@ -79,9 +79,9 @@ def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
 
 
 def _collect_garbage() -> None:
-    """Collect what has become unreachable: mostly among new objects only.
+    """Collect unreachable objects: mostly among new objects only.
 
-    Looking at all objects takes tens of milliseconds, and hardly any old one is part of a cycle.
+    Looking at all objects takes tens of milliseconds, and very few old ones are part of a cycle.
     """
     _, _, collections_of_new = gc.get_count()
     gc.collect(2 if collections_of_new >= _COLLECTIONS_OF_NEW else 1)

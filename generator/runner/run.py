@@ -1,4 +1,4 @@
-"""Runs: from a plan to a finished data set, or to an error that says how to resume."""
+"""Runs: from a plan to a finished data set, or to an error that explains how to resume."""
 
 import hashlib
 import json
@@ -64,7 +64,7 @@ class Settings:
         skip_failed: Record samples that cannot be made in the manifest, and go on without them.
             Shards that earlier runs made without some samples are kept, but ``repair`` tries these
             again. Errors of storage, lack of memory and exporters end the run as without it.
-        proof: What the data set must be; None = whatever the plan makes.
+        proof: Required digests of the data set; None = any result.
         allow_mixed_numerics, failed, write_media, write_records, linked_digests: See ``Job``;
             picklable.
     """
@@ -306,7 +306,7 @@ class _Run:
             raise supervisor.error
 
     def _replace_damaged(self, scan: Scan, monitor: RunMonitor) -> None:
-        """Hash the shards of earlier runs, so that no damage is sealed; replace damaged ones."""
+        """Hash the shards of earlier runs, and replace damaged ones: no damage may be sealed."""
         plan, store = self.job.plan, self.job.store
         if len(scan.missing) == plan.shard_count:
             return

@@ -3,14 +3,14 @@
 =========  ======================================================================================
 stage      content
 =========  ======================================================================================
-scene      the final scene: what randomizers drew and physics settled
+scene      the final scene, drawn by randomizers and settled by physics
 geometry   decoded label images: depth, ids, normals, flow
 render     decoded photographs, laser points, rows of devices
 labels     annotations
 encode     bytes of these files, which may differ although their contents are equal
 =========  ======================================================================================
 
-A stage uses the results of the stages before, so that the first one that differs has the cause.
+A stage uses the results of the stages before: the first one that differs has the cause.
 """
 
 import hashlib
@@ -48,9 +48,9 @@ class Difference:
     """The first difference of two samples.
 
     Attributes:
-        index: Of the sample.
+        index: Index of the sample.
         stage: One of ``STAGES``.
-        text: What differs, in words.
+        text: The difference, in words.
     """
 
     index: int
@@ -67,8 +67,8 @@ class SampleFiles:
     """The files of one sample in the folder of a shard.
 
     Attributes:
-        folder: Of the shard.
-        index: Of the sample.
+        folder: Folder of the shard.
+        index: Index of the sample.
     """
 
     folder: Path

@@ -43,7 +43,7 @@ class Sums:
     Attributes:
         digests: ``{path: sha256}`` of the lines that can be read; empty without the file.
         damaged: Some line cannot be read, or is there twice.
-        dataset_id: Of the data set with these files, the manifest's own line apart.
+        dataset_id: Id of the data set with these files, excluding the manifest's line.
     """
 
     digests: Mapping[str, str]
@@ -67,7 +67,7 @@ def parse_sums(data: bytes) -> Sums:
 
 
 def read_or_empty(path: Path) -> bytes:
-    """The bytes of a file; none if it is missing or no regular file."""
+    """The bytes of a file; none if it is missing or not a regular file."""
     return path.read_bytes() if path.is_file() else b""
 
 
@@ -81,7 +81,7 @@ def parse_object(data: bytes) -> dict[str, Any] | None:
 
 
 class Expectation(Protocol):
-    """What a data set must be to be sealed."""
+    """Requirements for sealing a data set."""
 
     def expect(self, entries: Sequence[Entry]) -> None:
         """Raise DeterminismError if it is another one; its files are sorted by path."""
@@ -93,7 +93,7 @@ class SealedBefore:
     """Seal of a data set that was damaged since.
 
     Attributes:
-        ids: Of the data set: according to its manifest and according to its sums. They differ if
+        ids: Ids of the data set: from its manifest and from its sums. They differ if
             one of the two files is damaged.
         sums: ``{path: sha256}``.
     """
@@ -115,7 +115,7 @@ class SealedBefore:
         # Shards first: exporters make the other files from them.
         paths.sort(key=lambda path: not path.startswith(f"{SHARDS_NAME}/"))
         raise DeterminismError(
-            f"{len(paths)} file(s) differ from what {SUMS_NAME} and {MANIFEST_NAME} declared: "
+            f"{len(paths)} file(s) differ from {SUMS_NAME} and {MANIFEST_NAME}: "
             f"{', '.join(paths[:3])}{' ...' if len(paths) > 3 else ''}; nothing was sealed.\n"
             f"  The replaced files are in run/quarantine. If {SUMS_NAME} itself is damaged, delete "
             "it and repeat the command"
@@ -123,7 +123,7 @@ class SealedBefore:
 
 
 def parse_seal(sums_data: bytes, manifest_data: bytes) -> SealedBefore:
-    """Parse what sums and manifest of a data set declare; no ids if both are empty."""
+    """Parse sums and manifest of a data set; no ids if both are empty."""
     sums = parse_sums(sums_data)
     manifest = parse_object(manifest_data) or {}
     ids = {str(manifest["dataset_id"])} if "dataset_id" in manifest else set()

@@ -44,7 +44,7 @@ class PipelineLike(Protocol):
 
     @property
     def exporters(self) -> Mapping[str, interfaces.Exporter]:
-        """Exporters by name, which is also that of the folder of their results."""
+        """Exporters by name, which is also the name of the folder of their results."""
         ...
 
     def sample(self, index: int) -> Sample:
@@ -153,7 +153,7 @@ def make_shard(
     """Generate and commit one shard, without the samples in ``failed``.
 
     The images of each sample are written and dropped at once; exporters then receive all samples
-    of the shard without pixels. Masks are tight crops, so that memory is bounded by the images of
+    of the shard without pixels. Masks are tight crops: memory is bounded by the images of
     one sample and the labels of one shard.
 
     Raises:
@@ -200,7 +200,7 @@ def make_shard(
 
 
 def _remove_files(index: int, folder: Path) -> None:
-    """Remove what a failed sample left in a shard folder, and folders that only it had."""
+    """Remove files of a failed sample from a shard folder, and folders that only it had."""
     for path in folder.glob(f"*/*/{index:09d}.*"):
         path.unlink()
     for pattern in ("*/*", "*"):

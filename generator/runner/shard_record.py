@@ -1,7 +1,7 @@
 """Records of committed shards; the existence of its record *is* the commit of a shard.
 
-A record ends in a checksum of itself: its digests decide whether files are damaged, so that a
-damaged record must be found before anything is compared with it.
+A record ends in a checksum of itself: its digests decide whether files are damaged; a damaged
+record must be found before any comparison with it.
 """
 
 import hashlib
@@ -101,7 +101,7 @@ class ShardRecord:
     def to_bytes(self) -> bytes:
         """Contents of the record's file: one line of canonical JSON.
 
-        Its ``sha256`` is that of the same line without it.
+        Its ``sha256`` is computed from the same line without that entry.
         """
         plain = serialization.to_plain(self)
         checksum = hashlib.sha256(serialization.canonical_json(plain).encode()).hexdigest()
@@ -115,7 +115,7 @@ def parse_record(data: bytes) -> ShardRecord | None:
 
 
 def parse_unchecked_record(data: bytes) -> ShardRecord | None:
-    """Parse the bytes of a record whose digest is known otherwise; None if they are no record.
+    """Parse the bytes of a record whose digest is known otherwise; None if they are not a record.
 
     A record with a path outside its shard's folder is none.
 

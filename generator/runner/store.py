@@ -360,7 +360,7 @@ class LocalStore:
             return Scan(missing, samples, size, rejections, tuple(failed))
 
     def quarantine_damaged(self, plan: Plan, shards: Iterable[int]) -> list[int]:
-        """Hash the files of these shards, and quarantine those that differ from their records.
+        """Hash the files of these shards, and quarantine files that differ from their records.
 
         Returns:
             The quarantined shards.

@@ -97,7 +97,7 @@ class StoredSamples:
 
     @cached_property
     def indices(self) -> Sequence[int]:
-        """Indices of all samples, ascending: those of the plan without the failed ones."""
+        """Indices of all samples, ascending: the plan's indices without the failed ones."""
         absent = set(self._absent)
         every = range(self.plan.n)
         return array("q", (i for i in every if i not in absent)) if absent else every
@@ -116,7 +116,7 @@ class StoredSamples:
     def labelled(self, index: int, has_points: bool = True) -> "LabelledImages":
         """The sample of that number, whose scene, images and points are read on access.
 
-        Without ``has_points``, its scans are empty, as those that exporters receive.
+        Without ``has_points``, its scans are empty, as exporters receive them.
 
         Raises:
             StorageError: a file of the sample's shard is missing or damaged.
@@ -234,7 +234,7 @@ class StoredSamples:
 class CheckedSamples(StoredSamples):
     """Samples whose scenes and labels are held against the records of their shards.
 
-    What is made of them gets checksums of its own, which damage in the source would pass.
+    Results made from them get new checksums, which damage in the source would pass.
     """
 
     def __init__(self, folder: str | PathLike[str]) -> None:
@@ -261,7 +261,7 @@ class CheckedSamples(StoredSamples):
         return super()._open_lines(path)
 
 
-RECORDED = "that of the shard's record"
+RECORDED = "the digest in the shard's record"
 
 
 def check_digest(path: Path, sha256: str | None, folder: Path, source: str) -> None:
@@ -286,7 +286,7 @@ def parse_dataset_id(manifest: Mapping[str, Any], place: object) -> str:
     identity = manifest.get("dataset_id")
     if not isinstance(identity, str) or not re.fullmatch(r"[0-9a-f]{64}", identity):
         raise StorageError(
-            f"{place}: damaged (dataset_id is no sha256); expected the manifest of a data set"
+            f"{place}: damaged (dataset_id is not a sha256); expected the manifest of a data set"
         )
     return identity
 
@@ -303,7 +303,7 @@ def read_capture(
 
     Args:
         info: Facts about the data set.
-        labels: Of the sample.
+        labels: Labels of the sample.
         folder: Folder of its shard.
         has_points: Whether scans have points and tables rows; exporters receive none.
         read: Reads a file below the folder.
@@ -329,7 +329,7 @@ def read_capture(
         points = _load(path, POINT, read)
         if not np.isfinite(points["position_m"]).all():
             raise StorageError(
-                f"{path}: holds a position that is no finite number; generate the data set again"
+                f"{path}: contains a position that is not finite; generate the data set again"
             )
         origins = None
         if scan.lidar.origins:

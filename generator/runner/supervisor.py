@@ -1,7 +1,7 @@
 """Decisions of the supervisor as a state machine: events in, actions out.
 
-It starts no process, reads no clock and accesses no file, so that a simulation with a virtual
-clock and seeded faults exercises exactly the production code.
+It starts no process, reads no clock and accesses no file: a simulation with a virtual clock and
+seeded faults exercises exactly the production code.
 """
 
 import signal
@@ -93,7 +93,7 @@ class Supervisor:
         describe_sample: Command that generates one sample by itself, for messages.
         skip_failed: Generate a shard without a sample that keeps killing its worker, or exceeds
             ``limits.sample_s``, instead of abandoning the shard.
-        error: The first error that ends the run, or else that of the first abandoned shard.
+        error: The first error that ends the run, or else the error of the first abandoned shard.
         given_up: Abandoned shards, which killed too many workers.
         deaths: Processes that ended unexpectedly.
     """
@@ -257,9 +257,9 @@ class Supervisor:
         return [Note(f"a worker takes no work: {error}")]
 
     def _drain(self, error: errors.GenDataError) -> list[Action]:
-        """Assign no more shards; those in progress are finished.
+        """Assign no more shards; shards in progress are finished.
 
-        The first error that ends the run precedes that of an abandoned shard, which does not.
+        The first error that ends the run precedes errors of abandoned shards, which do not end it.
         """
         if not self._draining:
             self.error = error

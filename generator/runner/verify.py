@@ -179,7 +179,7 @@ def find_deviations(
 
 
 def _is_manifest(value: Mapping[str, Any]) -> bool:
-    """Whether an object has a manifest's parts; that of another file may lie in its place."""
+    """Whether an object has a manifest's parts; another file's object may be in its place."""
     return (
         isinstance(value.get("shards"), list)
         and isinstance(value.get("files"), dict)
@@ -280,7 +280,7 @@ class _Check:
         elif size is None:
             yield finding("missing", text="is missing")
         elif size == IRREGULAR:
-            yield finding("size", text="is no regular file")
+            yield finding("size", text="is not a regular file")
         elif size != self._sizes.get(path, size):
             yield finding("size", text=f"has {size} bytes instead of {self._sizes[path]}")
         elif (full or path == PLAN_NAME) and self._digest(path) != self._sums[path]:

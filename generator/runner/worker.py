@@ -1,7 +1,7 @@
 """Worker process: starts its engines once and generates shards until it is dismissed.
 
-The module imports little, so that a new process can arrange to end with its parent before slow
-imports. It inherits the environment, where the command line limits BLAS and OpenMP to one thread,
+The module imports little: a new process can arrange to end with its parent before slow imports. It
+inherits the environment, where the command line limits BLAS and OpenMP to one thread,
 because their sums depend on the number of threads.
 """
 
@@ -38,7 +38,8 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
     """Entry point of the process; returns when it receives None or the connection closes.
 
     Args:
-        number: Of the worker; negative = told together with the path of its log, when the job is
+        number: Number of the worker; negative = sent together with the path of its log, when the
+            job is
             ready.
         connection_fd: Socket for shard numbers, each with the samples to leave out (in), and for
             events (out).
@@ -158,7 +159,7 @@ def _show_warning(
     *place: Any,
     **options: Any,
 ) -> None:
-    """Keep the texts of our own warnings, for the user; all go to the log of the worker."""
+    """Keep the texts of gen-data's warnings, for the user; all go to the log of the worker."""
     if category in (CacheWarning, ConfigWarning):
         notices.append(str(message))
     show(message, category, *place, **options)

@@ -57,11 +57,11 @@ class ShardDone:
 
     Attributes:
         bytes: Size of its files.
-        record_sha256: Of its record; empty = unknown.
+        record_sha256: SHA-256 of its record; empty = unknown.
         rss_bytes: Memory of the worker's process, 0 if unknown.
         timings_s: CPU seconds of the shard as a whole, by stage.
         failed: Samples that it does not have.
-        labels_sha256: Of its labels; empty = unknown.
+        labels_sha256: SHA-256 of its labels; empty = unknown.
     """
 
     worker: int
@@ -92,7 +92,7 @@ class Exited:
         exit_code: As of ``subprocess``: negative = killed by that signal.
         out_of_memory: The kernel killed some process for lack of memory at that time.
         cause: Description of its end where there is no exit code, as on another machine.
-        machine_lost: Its machine is gone, so that its shard is not to blame.
+        machine_lost: Its machine is gone: its shard is not to blame.
     """
 
     worker: int

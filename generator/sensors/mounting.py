@@ -33,12 +33,13 @@ class Mounting(Strict):
         file: Its name. The place in it replaces this key in the configuration, as ``offset_m``,
             ``yaw_deg``, ``pitch_deg`` and ``roll_deg``.
         frame: Name of the sensor's frame in it, such as cam1; empty = the only one.
-        relative_to: Name of the frame that is the rig's: its origin, and X forward, Y left, Z up
+        relative_to: Name of the frame of the rig: its origin, and X forward, Y left, Z up
             (a camera's frame is turned to these axes); empty = the root above ``frame``.
-        axes: Of ``frame``: optical, X right, Y down, Z forward; or body, X forward, Y left, Z up.
+        axes: Axes of ``frame``: optical, X right, Y down, Z forward; or body, X forward, Y left, Z
+            up.
             null = as the format has them; by the frame's name for ROS (REP 103).
         rectified: Whether to take the place of the rectified camera, from its projection matrix.
-        unit: Of lengths in the file.
+        unit: Unit of lengths in the file.
     """
 
     file: str
@@ -239,7 +240,7 @@ def warn_of_early_readings(sensors: Iterable[Sensor], steps_per_scene: int) -> N
         warnings.warn(
             f"sensors {', '.join(early)}: at the first step they read before anything moves and "
             "all velocities are 0; expected time_offset_s of 0 or more: add "
-            f"{-min(early.values()):g} to that of every sensor",
+            f"{-min(early.values()):g} to time_offset_s of every sensor",
             ConfigWarning,
             stacklevel=2,
         )
@@ -394,7 +395,7 @@ def rotation_vector(turn: SE3) -> Array:
 
 
 def remove_carrier(scene: Scene, rig: str) -> Scene:
-    """The scene without the body that carries a rig, so that it does not occlude devices."""
+    """The scene without the body that carries a rig, which must not occlude devices."""
     if not scene.rig(rig).body:
         return scene
     carrier = scene.body(scene.rig(rig).body)

@@ -36,11 +36,11 @@ def cloud_layer(
     Args:
         d: Unit directions of the upper hemisphere [rows, columns, 3], one elevation per row.
         cloudiness: Share of the sky under clouds.
-        sun_altitude_rad: Of a sun in the direction of +X.
-        seed: Of the clouds.
+        sun_altitude_rad: Altitude of a sun in the direction of +X.
+        seed: Seed of the clouds.
 
     Returns:
-        Cover in [0, 1], 0 below the horizon; brightness relative to that of a white cloud in
+        Cover in [0, 1], 0 below the horizon; brightness relative to a white cloud's in
         full light, 0 where there is none. Shape [rows, columns].
     """
     levels = _layer(cloudiness, sun_altitude_rad, seed)

@@ -1,7 +1,7 @@
 """Illuminance by sun and sky.
 
-Altitudes are those of the sun over the horizon [rad]; ``cloudiness`` runs from 0 (clear) over 0.5
-(broken clouds) to 1 (overcast); ``turbidity`` is that of Linke and Preetham: 2 very clear, 6 hazy.
+Altitudes are the sun's over the horizon [rad]; ``cloudiness`` runs from 0 (clear) over 0.5 (broken
+clouds) to 1 (overcast); ``turbidity`` is Linke's and Preetham's: 2 very clear, 6 hazy.
 
 Sources: IES RP-21, "Calculation of daylight availability", 1984 (sun and skies by day); Janiczek
 and DeYoung, "Computer programs for sun and moon illuminance", US Naval Observatory Circular 171,

@@ -54,12 +54,12 @@ class SkyModel:
     """Parameters of a sky.
 
     Attributes:
-        seed: Of the clouds.
+        seed: Seed of the clouds.
         sun_altitude_deg: Over the horizon; negative at night.
         turbidity: 2 very clear, 3 usual, 6 hazy.
         cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
-        ground_albedo: Of the land below the horizon.
-        model: ``measured``: the illuminance of IES RP-21, distributed as CIE S 011 tells, under any
+        ground_albedo: Albedo of the land below the horizon.
+        model: ``measured``: the illuminance of IES RP-21, distributed by CIE S 011, under any
             clouds, day and night.
             ``preetham``: the luminances of Preetham's clear sky by day as published.
     """
@@ -134,13 +134,13 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
 def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     """Relative luminance of the clear sky by day, linear RGB, zenith 1.
 
-    Luminances are those of CIE S 011; Preetham's fit leaves the sky opposite a sun in haze half as
+    Luminances follow CIE S 011; Preetham's fit leaves the sky opposite a sun in haze half as
     bright. Colours are Preetham's, with a horizon as pale as in photographs.
 
     Args:
         d: Unit directions, shape [h, w, 3], each row level.
         sun_altitude_rad: Over the horizon.
-        turbidity: Of the air.
+        turbidity: Turbidity of the air.
     """
     angles = _SkyAngles.of(d, sun_altitude_rad)
     clear_to = daylight.CLEAR_TURBIDITY
@@ -165,7 +165,7 @@ def preetham_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     Args:
         d: Unit directions, shape [h, w, 3], each row level.
         sun_altitude_rad: Over the horizon.
-        turbidity: Of the air.
+        turbidity: Turbidity of the air.
     """
     angles = _SkyAngles.of(d, sun_altitude_rad)
     luminance = angles.relative(_perez_factors("luminance", turbidity))
@@ -218,9 +218,9 @@ def _colored(angles: _SkyAngles, turbidity: float, luminance: Array, pale: Array
     """Luminances in Preetham's colours.
 
     Args:
-        angles: Of the directions.
-        turbidity: Of the air.
-        luminance: Of each direction [h, w].
+        angles: Angles of the directions.
+        turbidity: Turbidity of the air.
+        luminance: Luminance of each direction [h, w].
         pale: Share of the horizon's own colour in place of Preetham's, broadcast to [h, w, 1].
     """
     powers = np.array(
@@ -252,7 +252,7 @@ def overcast_sky(d: Array) -> Array:
 
 
 def _in_strips(compute: Callable[[Array], Array], d: Array) -> Array:
-    """What a function computes row by row; in strips, whose intermediate arrays stay in caches."""
+    """Result of a row-by-row function; in strips, whose intermediate arrays stay in caches."""
     return np.concatenate([compute(d[k : k + _STRIP_ROWS]) for k in range(0, len(d), _STRIP_ROWS)])
 
 

@@ -318,7 +318,7 @@ def _resample_path(line: _Line, passages: Sequence[Passage], length_m: float) ->
 
 
 def _limit_slope(least_m: Array) -> Array:
-    """Limit the slope of lower bounds along a path to that of stepping aside."""
+    """Limit the slope of lower bounds along a path to the slope of stepping aside."""
     eased: Array = least_m.copy()
     for k in range(1, len(eased)):
         eased[k] = max(eased[k], eased[k - 1] - ASIDE * GRID_M)

@@ -32,7 +32,7 @@ class Cycle:
 
     @property
     def share_s(self) -> float:
-        """Time from the start of one axis' green to that of the next [s]."""
+        """Time from the start of one axis' green to the start of the next one's [s]."""
         return self.green_s + AMBER_S + self.all_red_s
 
     @property

@@ -55,7 +55,7 @@ def follow_lines(
     """Compute the paths of n vehicles along their lines.
 
     Args:
-        lines_m: Points of the lines [n, m + l, 2], ``STATION_M`` apart, the first beside each
+        lines_m: Points of the lines [n, m + l, 2], ``STATION_M`` apart, the first next to each
             vehicle's rear axle.
         xy_m: Start positions of the rear axles [n, 2].
         ahead: Start directions of the vehicles [n, 2], unit.

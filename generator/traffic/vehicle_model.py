@@ -79,7 +79,7 @@ class VehicleModel:
         self.speed_m_s = self._speed_limits(np.zeros(n))
 
     def settle(self, crossers: Sequence[CrossingPedestrian]) -> None:
-        """Lower the speeds at time 0 so that comfortable braking suffices."""
+        """Lower the speeds at time 0 until comfortable braking suffices."""
         fleet = self.fleet
         stops = self._find_stops(0.0, crossers)
         room = np.maximum(stops - self.station_m - fleet.front_m - BEFORE_LINE_M, 0.0)

@@ -186,7 +186,7 @@ def _widest_by_lane(vehicles: Sequence[Vehicle]) -> dict[str, float]:
 
 
 def _followed_line(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
-    """Points [m, 3] that a vehicle follows: beside the middle of its lanes by ``left_m``."""
+    """Points [m, 3] that a vehicle follows: ``left_m`` to the left of the middle of its lanes."""
     points = points_at(graph, vehicle.route, vehicle.station_m + grid)
     if vehicle.left_m:
         way = steering.normalize(np.gradient(points[:, :2], axis=0))
@@ -196,7 +196,7 @@ def _followed_line(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
 
 
 def limit_braking(limits: Array) -> None:
-    """Lower limits [n, m] in place so that comfortable braking reaches the lower ones ahead."""
+    """Lower limits [n, m] in place until comfortable braking reaches the lower ones ahead."""
     for k in range(limits.shape[1] - 2, -1, -1):
         after = limits[:, k + 1]
         reachable = np.sqrt(after * after + 2.0 * EASY_M_S2 * STATION_M)

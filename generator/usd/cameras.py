@@ -14,7 +14,7 @@ from gen_data.usd.prims import T_CAMERA_USD, set_transforms
 
 PIXEL = 2.0**-11
 """Pixel width on the sensor in tenths of a scene unit, USD's unit for apertures: about 49
-micrometres. A power of two, so that apertures of whole pixels are exact."""
+micrometres. A power of two makes apertures of whole pixels exact."""
 CLIPPING_M = (0.01, 100_000.0)
 
 

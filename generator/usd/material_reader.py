@@ -29,7 +29,7 @@ class BoundMaterial:
         uv_name: Primvar of its texture coordinates.
         uv_matrix: Affine map [2, 3] of the texture coordinates.
         color_name: Primvar that is its colour; empty = it has a colour.
-        unused: What the material holds and is not used.
+        unused: Unused contents of the material.
     """
 
     name: str = ""
@@ -139,7 +139,7 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
         return look
     uv_name, uv_matrix = next(iter(placed.values()))
     unused = tuple(
-        f"material '{name}': the texture coordinates of {key} differ from those of "
+        f"material '{name}': the texture coordinates of {key} differ from the ones of "
         f"{next(iter(placed))} and are not used"
         for key, (other, matrix) in placed.items()
         if other != uv_name or not np.array_equal(matrix, uv_matrix)
@@ -223,7 +223,7 @@ def _image_path(node: Any, where: str) -> str:
     asset = _find_source(node, "file")[0]
     if asset is None or not asset.resolvedPath:
         name = asset.path[:80] if asset is not None else ""
-        raise AssetError(f"{where}: its image '{name}' is missing; put it beside the layer")
+        raise AssetError(f"{where}: its image '{name}' is missing; put it next to the layer")
     return str(asset.resolvedPath)
 
 

@@ -25,7 +25,7 @@ class MeshPrim:
         face_slots: int64 [m], indices into ``materials``.
         colors: float64 [m, 3, 3]: linear RGB at each corner, white where a material has colours;
             None = none.
-        remarks: What the prim holds and is not used.
+        remarks: Unused contents of the prim.
     """
 
     corners: Array
@@ -115,7 +115,7 @@ def _find_unused(mesh: Any, materials: tuple[BoundMaterial, ...]) -> tuple[str, 
 
 
 def _paint(prim: Any, mesh: MeshPrim, topology: _Topology) -> MeshPrim:
-    """Give the display colour to triangles whose material asks for it, or is missing."""
+    """Give the display colour to triangles whose material uses it, or is missing."""
     colors = np.ones((len(mesh.corners), 3, 3))
     materials, remarks, found = list(mesh.materials), list(mesh.remarks), False
     for slot, material in enumerate(mesh.materials):

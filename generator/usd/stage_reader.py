@@ -245,12 +245,12 @@ def _collect_warnings() -> Iterator[None]:
 
 
 def _reason(error: Exception) -> str:
-    """The cause in brackets, as far as the library's first error tells it; else nothing."""
+    """The cause in brackets, as far as the library's first error states it; else nothing."""
     text = str(getattr(error.args[0], "commentary", "")) if error.args else ""
     place = re.search(r"\.usd[ac]?:(\d+):(\d+): ", text)
     if place:
         return f" (syntax error at line {place[1]}, column {place[2]})"
-    causes = {"truncated": "damaged or cut off", "is not a valid": "its content is no USD"}
+    causes = {"truncated": "damaged or cut off", "is not a valid": "its content is not USD"}
     return next((f" ({cause})" for sign, cause in causes.items() if sign in text), "")
 
 

@@ -1,4 +1,4 @@
-"""Certificates of finished data sets: made, stored beside the manifest, and made again."""
+"""Certificates of finished data sets: made, stored next to the manifest, and made again."""
 
 import hashlib
 import json
@@ -28,10 +28,10 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Identity:
-    """What is certified.
+    """The certified data set.
 
     Attributes:
-        name: Of the configuration.
+        name: Name of the configuration.
         dataset_id: Digest of all files, as in the manifest.
         manifest_sha256: Digest of the manifest.
         samples: Number of samples.
@@ -54,7 +54,7 @@ class CheckedClaim:
 
 @dataclass(frozen=True)
 class Certificate:
-    """Claims about one data set, with what checking them found.
+    """Claims about one data set, with the findings of their checks.
 
     Equal data sets, scopes and versions give equal certificates.
 
@@ -74,7 +74,7 @@ class Certificate:
     format_version: int = FORMAT_VERSION
 
     def findings(self, status: Status | None = None) -> Iterator[tuple[CheckedClaim, Finding]]:
-        """Findings with their claims; all, or those with a status."""
+        """Findings with their claims, of all statuses or of one."""
         for claim in self.claims:
             for finding in claim.findings:
                 if status in (None, finding.status):
@@ -101,9 +101,9 @@ def examine(
     """Check all claims about a finished data set.
 
     Args:
-        folder: Of the data set.
+        folder: Folder of the data set.
         scope: How much is sampled.
-        date: Of the certificate; empty = none.
+        date: Date of the certificate; empty = none.
         progress: Called with the name of each claim when its check begins.
 
     Raises:
@@ -119,7 +119,7 @@ def examine(
         findings = (not_checked("", damaged),) if damaged else _check(claim, examined)
         claims.append(CheckedClaim(claim.name, claim.statement, tuple(findings)))
         if claim is FILES and findings[0].status is Status.FAILED:
-            damaged = "the files are not those of the manifest"
+            damaged = "the files differ from the manifest"
     return Certificate(identify(examined.stored), scope, _versions(), tuple(claims), date)
 
 
@@ -134,7 +134,7 @@ def load_certificate(folder: Path) -> Certificate | None:
     """Read the certificate of a data set; None if there is none.
 
     Raises:
-        VerificationError: it is damaged, or that of another data set.
+        VerificationError: it is damaged, or belongs to another data set.
         StorageError: the manifest is damaged.
     """
     path = folder / layout.CERTIFICATE_NAME
@@ -148,7 +148,7 @@ def load_certificate(folder: Path) -> Certificate | None:
         return None
     except plan.DAMAGE as error:
         raise errors.VerificationError(
-            f"{path}: is no certificate of this version of gen-data ({error}); {_REMEDY}"
+            f"{path}: is not a certificate of this version of gen-data ({error}); {_REMEDY}"
         ) from None
     identity = identify(StoredSamples(folder))
     if certificate.dataset != identity:
@@ -165,8 +165,8 @@ _REMEDY = "make it again with gen-data certify, or remove it"
 def compare(stored: Certificate, again: Certificate) -> tuple[list[str], list[str]]:
     """Contradictions and notes: a stored certificate against one that was made again.
 
-    What failed now is a contradiction, and so are figures that differ although the same versions
-    checked the same files. What could not be checked now is a note.
+    A failure now is a contradiction, and so are figures that differ although the same versions
+    checked the same files. A check that is not possible now is a note.
     """
     was = {(claim.name, f.subject): f for claim, f in stored.findings()}
     now = {(claim.name, f.subject): f for claim, f in again.findings()}

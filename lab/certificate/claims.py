@@ -16,7 +16,7 @@ class Claim:
 
     Attributes:
         name: In certificates.
-        statement: What holds if it passes.
+        statement: Statement that holds if it passes.
         place: ``module:function`` of the check, which yields findings.
     """
 
@@ -44,7 +44,7 @@ CLAIMS = (
     FILES,
     Claim(
         "run log",
-        "Shards and data set are those that the log of the run says were committed and sealed.",
+        "Shards and data set agree with the commits and the seal in the log of the run.",
         "run_log:check_run_log",
     ),
     Claim(
@@ -60,8 +60,8 @@ CLAIMS = (
     ),
     Claim(
         "exports",
-        "Packages of other makers read the exports. Where a format has 2D boxes and its reader "
-        "compares them, classes, splits, boxes and masks are those of the labels, which score an "
+        "Third-party packages read the exports. Where a format has 2D boxes and its reader "
+        "compares them, classes, splits, boxes and masks equal the labels, which score an "
         "average precision of 1 as predictions.",
         "exports:check_exports",
     ),
@@ -73,13 +73,13 @@ CLAIMS = (
     ),
     Claim(
         "pixels",
-        "Intel Embree, an independent ray caster, meets the stated things at the stated depths "
+        "Intel Embree, an independent ray caster, meets the stated objects at the stated depths "
         "in random pixels of random images.",
         "pixels:check_pixels",
     ),
     Claim(
         "laser points",
-        "Intel Embree meets the stated things at random laser points of random scans, within the "
+        "Intel Embree meets the stated objects at random laser points of random scans, within the "
         "noise of the device.",
         "points:check_points",
     ),

@@ -74,7 +74,7 @@ class Examined:
         """Why this installation does not draw the same scenes; empty if it does."""
         plan = self.stored.plan
         if plan.scenes_of:
-            return f"the scenes are those of the data set {plan.scenes_of[:16]}: certify that one"
+            return f"the scenes come from the data set {plan.scenes_of[:16]}: certify that one"
         try:
             changes = self.regeneration.changes
         except errors.GenDataError as error:
@@ -86,7 +86,7 @@ class Examined:
 
     @cached_property
     def regeneration(self) -> Regeneration:
-        """What makes its samples again.
+        """Plan and pipeline that make its samples again.
 
         Raises:
             ConfigError, AssetError: the configuration or an asset is not available here.
@@ -109,7 +109,7 @@ class Examined:
         return np.asarray(reading.channels[capture.Channel.RGB], np.uint8)
 
     def rng(self, name: str) -> streams.Rng:
-        """A stream for choosing what is sampled: the same for the same data set."""
+        """A stream for choosing samples: the same for the same data set."""
         return streams.Streams(0, 0).rng(f"certificate/{self.stored.dataset_id}/{name}")
 
     def chosen_indices(self) -> list[int]:

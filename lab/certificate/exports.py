@@ -1,4 +1,4 @@
-"""Claim: readers of other makers find in each export exactly what the labels of the data set say.
+"""Claim: third-party readers recover the data set's labels from every export.
 
 Pictures, boxes, categories, splits and masks must be equal; and the labels, scored as predictions
 against the export by COCO's evaluation, must have an average precision of 1.
@@ -50,7 +50,7 @@ def _unable(examined: Examined, exporter: interfaces.Exporter, reader: Reader | 
     if getattr(exporter, "cameras", ()) or getattr(exporter, "rectify", False):
         return "its fields cameras or rectify give it other images than the labels have, by design"
     if getattr(exporter, "bbox", "visible") != "visible":
-        return "its boxes are those of whole silhouettes, which labels of visible pixels are not"
+        return "its boxes enclose whole silhouettes, unlike labels of visible pixels"
     return reader.missing()
 
 

@@ -1,4 +1,4 @@
-"""Claim: the files are those that the manifest names."""
+"""Claim: the files are the manifest's files."""
 
 import os
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What checking a claim found: one finding per export, sensor or data set."""
+"""Findings of a claim's check: one per export, sensor or data set."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ Figure = int | float | str
 
 
 class Status(str, Enum):
-    """Outcome of a check. What was not checked is no success: the reason says what is missing."""
+    """Outcome of a check. An unchecked claim is not a pass: its reason states why."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -23,11 +23,11 @@ class Finding:
     """One outcome.
 
     Attributes:
-        subject: What was checked: an export, a sensor; empty = the data set.
+        subject: The checked export or sensor; empty = the data set.
         status: The outcome.
         reason: Why it was not checked; empty otherwise.
-        figures: What was counted and measured, by name; numbers are rounded, so that they are the
-            same on every machine.
+        figures: Counts and measurements, by name; numbers are rounded, to be the same on every
+            machine.
         evidence: The first contradictions, in words; empty unless failed.
     """
 

@@ -22,7 +22,7 @@ class LabelledObject:
     """An object in an image.
 
     Attributes:
-        mask: Of its visible pixels; None if the format, or the data set, has none.
+        mask: Mask of its visible pixels; None if the format, or the data set, has none.
     """
 
     category: str
@@ -36,7 +36,7 @@ class LabelledImage:
 
     Attributes:
         index: Number of the sample.
-        pixels: Digest of its photograph; empty if it is not stated, or compressed anew.
+        pixels: Digest of its photograph; empty if it is not stated, or compressed again.
     """
 
     index: int
@@ -53,7 +53,7 @@ class LabelledImage:
 
 @dataclass(frozen=True)
 class Loaded:
-    """What a reader found.
+    """Contents of an export, as a reader returns them.
 
     Attributes:
         images: Labelled images; None for a format whose reader counts only.
@@ -128,9 +128,9 @@ def compare_images(
         if other.size_px != image.size_px:
             yield f"{image}: has {other.size_px} px, expected {image.size_px}"
         if image.pixels and other.pixels not in ("", image.pixels):
-            yield f"{image}: its picture is not that of the data set"
+            yield f"{image}: its picture differs from the data set's"
         yield from (f"{image}: {fact}" for fact in _compare_objects(image, other, tolerance_px))
-    yield from (f"{name}: is no image of the data set" for name in by_name)
+    yield from (f"{name}: is not an image of the data set" for name in by_name)
 
 
 def _compare_objects(

@@ -11,10 +11,10 @@ CLASSES = {Status.PASSED: "good", Status.FAILED: "bad", Status.NOT_CHECKED: "qui
 """Classes of the style sheet."""
 
 LIMITS = (
-    "A certificate does not say that the data set is realistic, that a model trained on it works "
+    "A certificate does not state that the data set is realistic, that a model trained on it works "
     "elsewhere, or that its configuration is the one you wanted. Meshes, poses and materials are "
-    "taken as they are. What is listed as not checked is unknown, and a claim about samples holds "
-    "for the share that was sampled."
+    "taken as they are. Unchecked claims are unknown, and a claim about samples holds "
+    "for the sampled share."
 )
 
 
@@ -43,7 +43,7 @@ def format_page(certificate: Certificate) -> str:
             *(f"<p>{escape(name)}: {escape(value)}</p>" for name, value in facts.items()),
             "</div>",
             *(part for claim in certificate.claims for part in _claim(claim)),
-            f"<h2>What this does not say</h2><p>{escape(LIMITS)}</p>",
+            f"<h2>Limits</h2><p>{escape(LIMITS)}</p>",
             "<p>gen-data verify --deep repeats every claim on your machine.</p></main>",
         )
     )

@@ -27,7 +27,7 @@ class Comparison:
     """One comparison of drawn values with their distribution.
 
     Attributes:
-        name: Of the parameter, with the number of the degree of freedom where it has several.
+        name: Name of the parameter, with the number of the degree of freedom where it has several.
         n: Number of values.
         deviation: Largest difference of the cumulative shares, in [0, 1].
         p_value: Probability of such a deviation, or of a larger one, if the values follow it.
@@ -62,7 +62,7 @@ def check_parameters(examined: Examined) -> Iterator[Finding]:
     """Test the drawn values of every parameter."""
     (draws,) = check_draws(examined)
     if draws.figures.get("contradictions") != 0:
-        yield not_checked("", draws.reason or "the drawn values are not those of the data set")
+        yield not_checked("", draws.reason or "the drawn values differ from the data set")
         return
     parameters = examined.replay.parameters
     alpha = examined.scope.alpha

@@ -1,4 +1,4 @@
-"""Claim: an independent ray caster meets the same things at the same depths in sampled pixels."""
+"""Claim: an independent ray caster meets the same objects at the same depths in sampled pixels."""
 
 from collections.abc import Iterator
 
@@ -18,11 +18,11 @@ from gen_data.lab.certificate.ray_casting import UNSTATED, Agreement, RayCaster,
 RELATIVE_TOLERANCE = 1e-4
 """Of distances: 32-bit coordinates of the renderer, in worlds of some hundred metres (assumed)."""
 ROLLING_TOLERANCE = 1e-3
-"""Of distances in rows of a rolling shutter among moving things.
+"""Of distances in rows of a rolling shutter among moving objects.
 
-Rows share an instant while nothing in them moves farther than 0.25 pixels. What comes nearer at the
-centre of an image, while points at its border, 600 pixels away, move so far, does so by 0.25 / 600
-of its distance; by more if it is nearer than they are.
+Rows share an instant while nothing in them moves farther than 0.25 pixels. A point that comes
+nearer at the centre of an image, while points at its border, 600 pixels away, move so far, does so
+by 0.25 / 600 of its distance; by more if it is nearer than they are.
 """
 
 
@@ -95,15 +95,15 @@ def _compare(examined: Examined, sample: Sample, name: str, agreement: Agreement
     agreement.others["empty"] += int(np.isinf(seen.distance).sum())
     for k in np.flatnonzero(~agreed):
         agreement.contradictions.add(
-            f"sample {sample.index}, pixel ({u[k]}, {v[k]}): a ray does not meet what is stated, "
-            f"{seen.distance[k]:.3f} m away, instance {seen.instance_id[k]}"
+            f"sample {sample.index}, pixel ({u[k]}, {v[k]}): a ray does not meet the stated "
+            f"surface, {seen.distance[k]:.3f} m away, instance {seen.instance_id[k]}"
         )
 
 
 def stated_ids(reading: SensorReading, truth: ImageTruth | None) -> NDArray[np.int64]:
     """Instance ids, [height, width]: of the image of instances, or else of the masks.
 
-    ``UNSTATED`` where neither says anything.
+    ``UNSTATED`` where neither states an id.
     """
     if Channel.INSTANCE in reading.channels:
         return reading.channels[Channel.INSTANCE].astype(np.int64)
@@ -131,7 +131,8 @@ def state_distances(
         per_ray: Depth per distance along the ray; 1 for ranges.
         ids: Instance ids.
         scale_m: Metres per unit of the file.
-        relative_tolerance: Of distances, beside the rounding of the file.
+        relative_tolerance: Relative tolerance of distances, in addition to the rounding of the
+            file.
     """
     distance = image / per_ray
     vacant = np.isinf(distance)

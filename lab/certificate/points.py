@@ -1,7 +1,7 @@
 """Claim: an independent ray caster meets the surfaces that sampled laser points lie on.
 
 A ray goes from the laser's place at the instant of the pulse towards the point, and must meet the
-point's thing at its distance: within the noise of the device, and without a solid thing before it.
+point's object at its distance: within the noise of the device, and without a solid one before it.
 """
 
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ ELSEWHERE = tuple(SURFACES.index(name) for name in ("air", "mirrored"))
 """Surfaces of points at whose place there is nothing."""
 
 INSTANTS = 4
-"""Instants of a scan that are examined if the world moves: each is a world of its own."""
+"""Instants of a scan that are examined if the world moves: each is a separate world."""
 
 NOISE_MAX = 6.0
 """Standard deviations of the range; a normal deviate exceeds them twice in a billion."""
@@ -156,7 +156,7 @@ def _choose_pulses(
 def laser_places_m(model: scan_pattern.LidarModel, points: NDArray[np.void]) -> Array:
     """Where the beams of points leave the scanner, lidar frame of their instant [m], [n, 3].
 
-    Lasers of a rotating scanner are at heights of their own, and beside its axis; its azimuth
+    Lasers of a rotating scanner are at different heights, and next to its axis; its azimuth
     follows from the time.
     """
     if model.prisms is not None:

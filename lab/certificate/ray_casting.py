@@ -1,9 +1,9 @@
 """An independent ray caster: Intel Embree, through Open3D, over the same meshes and poses.
 
-It shares scenes, meshes and materials with the renderer, and nothing of what the renderer makes of
-them: hierarchies, rasteriser, intersections, labels, encoding. Rays list all surfaces they cross,
-so that holes in textures and panes of glass need no textures here: a surface that a ray may pass
-hides nothing behind it.
+It shares scenes, meshes and materials with the renderer, and none of the renderer's results:
+hierarchies, rasteriser, intersections, labels, encoding. Rays list all surfaces they cross; holes
+in textures and panes of glass need no textures here: a surface that a ray may pass hides nothing
+behind it.
 """
 
 from collections import Counter
@@ -34,12 +34,12 @@ Passes = Callable[[asset_types.Material], bool]
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What a data set says about rays, in units of the lengths of their directions; arrays [n].
+    """Stated contents of rays, in units of the lengths of their directions; arrays [n].
 
     Attributes:
         distance: To the first surface; inf = nothing, NaN = not stated.
-        tolerance: Of the distance.
-        instance_id: Of what is there; ``UNSTATED`` = not stated.
+        tolerance: Tolerance of the distance.
+        instance_id: Id of the surface's instance; ``UNSTATED`` = not stated.
         reach: Farthest distance that would have been stated.
     """
 
@@ -88,7 +88,7 @@ class Agreement:
 def share_limit(k: int, n: int) -> float:
     """Upper limit, at ``CONFIDENCE``, to a share of which k of n independent draws were found.
 
-    That of Clopper and Pearson (Biometrika 26, 1934).
+    The limit of Clopper and Pearson (Biometrika 26, 1934).
     """
     from scipy import stats
 
@@ -101,7 +101,7 @@ class RayCaster:
     Args:
         scene: The world.
         library: Its assets.
-        origin_m: Coordinates are counted from here, world: 32 bits are for what is near.
+        origin_m: Coordinates are counted from here, world: 32 bits suffice for nearby points.
         passes: Whether rays may go through surfaces of a material.
 
     Raises:
@@ -134,16 +134,16 @@ class RayCaster:
         self._passable = np.concatenate(passable) if passable else np.zeros(0, bool)
 
     def agrees(self, origins_m: se3.Array, directions: se3.Array, seen: Seen) -> NDArray[np.bool_]:
-        """Whether surfaces that rays cross are what a data set says, bool [n].
+        """Whether surfaces that rays cross are as the data set states, bool [n].
 
         A ray agrees if one of the surfaces that it can reach is at the stated distance and belongs
-        to the stated thing. Where nothing is stated, nothing within reach may stop the ray; without
-        a distance, no thing may stand for a background or for nothing.
+        to the stated object. Where nothing is stated, nothing within reach may stop the ray;
+        without a distance, no object may stand for a background or for nothing.
 
         Args:
-            origins_m: Of the rays, world, [n, 3].
+            origins_m: Origins of the rays, world, [n, 3].
             directions: World, of any length, [n, 3].
-            seen: What the data set says.
+            seen: Statements of the data set.
         """
         ray, distance, ids, solid = self._crossings(origins_m, directions)
         within = distance < seen.reach[ray]
@@ -193,7 +193,7 @@ def has_holes(library: interfaces.AssetLibrary) -> Passes:
 
 
 GLASS = "glass"
-"""Role of panes that stop what is seen and let laser light through; house windows do not."""
+"""Role of panes that stop sight and let laser light through; house windows do not."""
 
 
 def lets_light_through(library: interfaces.AssetLibrary) -> Passes:

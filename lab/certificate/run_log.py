@@ -1,8 +1,8 @@
 """Claim: the data set is the one that its run sealed.
 
 ``run/log.jsonl`` has the record of every shard, as it was committed, and the identity of the data
-set. It is no part of the data set, so that whoever changes files and makes all checksums again does
-not change it in passing: pictures that are exchanged in shards and exports alike are found in all
+set. It is not part of the data set: whoever changes files and makes all checksums again does not
+change it in passing. Pictures that are exchanged in shards and exports alike are found in all
 samples, without generating any.
 """
 
@@ -18,7 +18,7 @@ from gen_data.runner.store import LocalStore
 
 
 def check_run_log(examined: Examined) -> Iterator[Finding]:
-    """Compare the identity and the records of all shards with those in the log of the run."""
+    """Compare the identity and the records of all shards with the log of the run."""
     stored = examined.stored
     store, plan = LocalStore(stored.folder), stored.plan
     path = store.run_dir / LOG_NAME
@@ -29,7 +29,7 @@ def check_run_log(examined: Examined) -> Iterator[Finding]:
     entries = [entry for line in path.read_bytes().splitlines() if (entry := parse_object(line))]
     sealed = [identity for entry in entries if (identity := _identity(entry))]
     if not sealed:
-        yield not_checked("", f"{RUN_NAME}/{LOG_NAME} does not say what was sealed")
+        yield not_checked("", f"{RUN_NAME}/{LOG_NAME} has no record of the seal")
         return
     contradictions = Contradictions()
     committed = {e["shard"]: e["record_sha256"] for e in entries if e.get("record_sha256")}
@@ -49,6 +49,6 @@ def check_run_log(examined: Examined) -> Iterator[Finding]:
 
 
 def _identity(entry: Mapping[str, Any]) -> str:
-    """The identity of the data set that a line of the log says was finished; empty = none."""
+    """The identity of the finished data set in a line of the log; empty = none."""
     summary = entry.get("summary")
     return str(summary.get("dataset_id", "")) if isinstance(summary, Mapping) else ""

@@ -22,7 +22,7 @@ def average_precision(
     Args:
         truth: Taken for the ground truth.
         predictions: Taken for the output of a detector.
-        kind: What is compared; objects without a mask have none.
+        kind: Compared shapes; objects without a mask have none.
     """
     from pycocotools.coco import COCO
     from pycocotools.cocoeval import COCOeval

@@ -15,8 +15,8 @@ from gen_data.runner.provenance import SCENES_NAME
 def check_splits(examined: Examined) -> Iterator[Finding]:
     """Compare the splits of all samples of each scene, and of scenes with equal contents.
 
-    The number of a scene follows from that of the sample; the splits are those of the labels and of
-    the kept scenes. Contents are the bodies: what stands where.
+    The number of a scene follows from the sample's number; the splits are read from the labels and
+    from the kept scenes. Contents are the bodies and their poses.
     """
     contradictions = Contradictions()
     info = examined.stored.info

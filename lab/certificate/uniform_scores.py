@@ -3,11 +3,12 @@
 If a value follows its distribution F, F(value) is uniform in [0, 1] (Rosenblatt, "Remarks on a
 multivariate transformation", Annals of Mathematical Statistics 23, 1952). Values of any number of
 distributions can then be judged together, as for a parameter that depends on shared values. A
-discrete value is spread evenly over the step of F at it, by a random number of its own (Smith,
+discrete value is spread evenly over the step of F at it, by a separate random number (Smith,
 "Diagnostic checks of non-standard time series models", Journal of Forecasting 4, 1985). A vector
 has one score per degree of freedom.
 
-Formulas are those of the cumulative distributions, not of the code that draws: nothing here calls
+Formulas are taken from the cumulative distributions, not from the code that draws: nothing here
+calls
 ``draw``.
 """
 
@@ -53,7 +54,7 @@ def uniform_scores(distribution: Distribution[Any], value: Any, rng: Rng) -> Sco
 
     Returns:
         None for a value that the distribution cannot give; empty for distributions without
-        randomness, such as sequences, and for those of third parties.
+        randomness, such as sequences, and for third-party distributions.
     """
     transform = _TRANSFORMS.get(type(distribution))
     if transform is None:

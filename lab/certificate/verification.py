@@ -10,7 +10,7 @@ def check_certificate(folder: Path, deep: bool) -> tuple[list[str], list[str]]:
     """Compare a certificate with the manifest, and with ``deep`` with one that is made now.
 
     Returns:
-        Contradictions; and notes on what was compared. Both are empty without a certificate.
+        Contradictions; and notes on the comparison. Both are empty without a certificate.
     """
     if not (folder / CERTIFICATE_NAME).is_file():
         return [], []

@@ -17,7 +17,7 @@ from gen_data.runner.store import LocalStore
 def check_written_again(examined: Examined) -> Iterator[Finding]:
     """Export the stored samples once more, and compare names and digests of all files.
 
-    Images are linked, not copied; labels are written from those of the samples.
+    Images are linked, not copied; labels are written from the samples' labels.
     """
     if examined.changes:
         yield not_checked("", examined.changes)

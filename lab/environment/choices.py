@@ -14,8 +14,8 @@ def choose_arm(factory: PipelineFactory, name: str, settings: Node) -> Articulat
     """The arm of that name, or the only one; the same robot in all scenes.
 
     Args:
-        factory: Of the configuration.
-        name: Of the arm; empty = the only one.
+        factory: Factory of the configuration.
+        name: Name of the arm; empty = the only one.
         settings: Source of the name.
 
     Raises:
@@ -49,8 +49,8 @@ def choose_camera(factory: PipelineFactory, name: str, settings: Node) -> tuple[
     """Name and size of a camera.
 
     Args:
-        factory: Of the configuration.
-        name: Of the camera; empty = the first one.
+        factory: Factory of the configuration.
+        name: Name of the camera; empty = the first one.
         settings: Source of the name.
 
     Raises:

@@ -43,7 +43,7 @@ class Control(Protocol):
         ...
 
     def command(self, action: Action, before: Command) -> Command | None:
-        """Targets after the latest ones; None if the arm cannot reach what is asked for."""
+        """Targets after the latest ones; None if the arm cannot reach the requested ones."""
         ...
 
 

@@ -111,13 +111,13 @@ class Env(gymnasium.Env[Observation, control.Action]):
         """Begin an episode.
 
         Args:
-            seed: Number of the scene, and beginning of those that follow; None = the next one,
+            seed: Number of the scene, and beginning of the ones that follow; None = the next one,
                 which without any seed before differs from run to run, as usual in Gymnasium.
             options: None are known.
 
         Raises:
             SceneRejected: no layout of the scene has a solution, such as a goal out of reach; the
-                message says what to change.
+                message names the change to make.
         """
         if options:
             raise ConfigError(f"options: unknown option '{min(options)}'; none are expected")
@@ -150,7 +150,7 @@ class Env(gymnasium.Env[Observation, control.Action]):
         """Act, and observe ``settings.step_s`` later.
 
         ``info`` has ``success``, ``held`` (name of the body in the hand), ``feasible`` (whether the
-        arm can reach what the action asked for) and ``blocked`` (whether an obstacle stopped it).
+        arm can reach the target of the action) and ``blocked`` (whether an obstacle stopped it).
 
         Raises:
             ConfigError: the action does not fit the action space.
@@ -213,7 +213,7 @@ class Env(gymnasium.Env[Observation, control.Action]):
 
 
 def make_vec(config: ConfigLike, n: int, **options: Any) -> gymnasium.vector.AsyncVectorEnv:
-    """``n`` environments, each in a process of its own.
+    """``n`` environments, each in a separate process.
 
     Args:
         config: As for ``Env``.

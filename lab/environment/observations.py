@@ -1,4 +1,4 @@
-"""Observations: what a policy sees of an episode."""
+"""Observations: a policy's input in an episode."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ def observation_space(robot: RobotModel, image: Intrinsics, settings: EnvSetting
     """The space of ``observe``.
 
     ``rgb`` is uint8 [h, w, 3], ``depth`` float32 [h, w, 1] along the optical axis [m].
-    ``joint_positions`` and ``joint_velocities`` are those of the arm joints [rad or m, and per s],
+    ``joint_positions`` and ``joint_velocities`` refer to the arm joints [rad or m, and per s],
     ``gripper_opening`` is in [0, 1]. ``hand_position`` [m] and ``hand_rotation`` (quaternion w, x,
     y, z) are the grasp frame's in the frame of the arm's base, as are ``object_position`` and
     ``goal_position``, the middles of the two bodies of the task's first condition of success;

@@ -27,7 +27,7 @@ class Rollout:
         scene: The scene now, with sensors in their places.
         simulation: Arm and bodies.
         steps: Number of actions so far.
-        is_feasible: Whether the arm can reach what the latest action asked for.
+        is_feasible: Whether the arm can reach the target of the latest action.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class Rollout:
         return bool(holds) and all(past if c.ever else now for c, now, past in ever)
 
     def _observed(self) -> Scene:
-        """The scene now; what has not moved is identical, so that it is not packed again."""
+        """The scene now; objects that have not moved are identical, and not packed again."""
         poses = self.simulation.poses()
         scene = scene_time.scene_at(self._start, self._time_s)
         moved = [

@@ -31,7 +31,7 @@ class DrawnDynamics:
 
 
 class Dynamics(base_model.Strict):
-    """Dynamics, drawn anew at every reset; constants switch the variation off.
+    """Dynamics, drawn again at every reset; constants switch the variation off.
 
     Attributes:
         mass_factor: Factor on the mass of every body that can move, drawn for each.
@@ -85,7 +85,7 @@ class EnvSettings(base_model.Strict):
             base [m].
         depth_m_max: Depths are observed up to this distance [m], which also stands for nothing.
         proximity_m_max: Range of the proximity sensors of the fingers [m].
-        dynamics: What every reset draws beside the scene.
+        dynamics: Further draws of every reset, besides the scene.
     """
 
     control: ControlName = "cartesian_delta"

@@ -20,7 +20,7 @@ from gen_data.sensors.camera.image_pipeline import ImagePipeline
 CLIP = 2.5
 """Standard deviations at which fitted normal distributions are clipped."""
 NOISE_EXCESS = 1.0
-"""Logarithm, base 2, of the least noise over that of rounding for which a sensor is added."""
+"""Logarithm, base 2, of the least noise over rounding noise for which a sensor is added."""
 Prepare = Callable[[ImagePipeline], ImagePipeline]
 
 
@@ -154,7 +154,7 @@ def _unmeasurable(
         elif not len(ours):
             reason = "not measurable in any simulated photograph"
         elif quantity in added and np.median(theirs) < np.median(ours) + NOISE_EXCESS:
-            reason = "no noise beyond that of eight bits; the camera has no image_sensor"
+            reason = "no noise beyond the rounding to eight bits; the camera has no image_sensor"
         reasons.append(reason)
     if sensorless:
         # A sensor is added as a whole, or not at all.

@@ -1,4 +1,4 @@
-"""Further statistics that are compared and not fitted: what a fit leaves different."""
+"""Further statistics that are compared and not fitted: remaining differences after a fit."""
 
 from collections.abc import Callable
 

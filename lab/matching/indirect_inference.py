@@ -1,4 +1,4 @@
-"""Parameters by simulation: those with which simulated recordings have the statistics of real ones.
+"""Parameters by simulation: simulated recordings with them have the statistics of real ones.
 
 This is indirect inference (Gourieroux, Monfort and Renault, "Indirect inference", Journal of
 Applied Econometrics 8, 1993): a statistic need not estimate its parameter, as long as it changes
@@ -7,10 +7,11 @@ parameters; the search for equal means is a bounded trust-region one, with the s
 for all candidates, and derivatives by finite differences.
 
 The configuration's own values are a prior, whose wide deviations matter only where the recordings
-hardly determine a parameter.
+determine a parameter poorly.
 
-What real statistics vary more than simulated ones, whose parameters are constant, is the spread of
-the parameters between recordings. Statistics are no linear functions of parameters, so that spread
+The excess of the variation of real statistics over simulated ones, whose parameters are constant,
+is the spread of the parameters between recordings. Statistics are not linear functions of
+parameters, and spread
 shifts their means: parameters are estimated again from simulated recordings with this spread.
 """
 
@@ -26,8 +27,8 @@ from gen_data.core.se3 import Array
 from gen_data.core.streams import Streams
 
 Simulate = Callable[[Array, int], Array]
-"""Statistics [scenes, k] for parameters [k], or those of each scene [scenes, k], of so many of the
-simulated scenes, at most."""
+"""Statistics [scenes, k] for parameters [k], or for parameters of each scene [scenes, k], of so
+many of the simulated scenes, at most."""
 EVERY = 1 << 30
 """All scenes."""
 
@@ -47,7 +48,7 @@ SPREAD_N = 8
 SPREAD_ERRORS = 2.0
 """Standard errors above which an excess of variance is significant."""
 _ROUNDING = 1e-8
-"""Variance of a mean of equal values, so that its weight is finite."""
+"""Variance of a mean of equal values, to keep its weight finite."""
 WINSORISED = 0.05
 """Share of the values that are moved to the next one at either end before a variance."""
 _WINSORISED_VARIANCE = 0.8313
@@ -104,8 +105,8 @@ class Estimate:
 
     Attributes:
         mean: In the coordinate of the axis.
-        half_width: Of the 95 % interval of the mean; inf for a single recording.
-        spread: Standard deviation between recordings beyond that of the scenes; 0 if it is not
+        half_width: Half width of the 95 % interval of the mean; inf for a single recording.
+        spread: Standard deviation between recordings beyond the scenes' deviation; 0 if it is not
             significant, or unknown.
         n: Number of recordings.
         n_enough: Number of recordings for an interval of ``Axis.enough``; None if the simulated
@@ -141,7 +142,7 @@ def _ordered(values: Array) -> tuple[Array, NDArray[np.int64]]:
 def _limited(values: Array, share: float) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
     """Values [..., n, k] with this share at either end moved to the next value that remains.
 
-    Also the number [..., k] of values, and of those that were moved at each end.
+    Also the number [..., k] of values, and of moved values at each end.
     """
     ordered, count = _ordered(values)
     cut = (share * count).astype(int)
@@ -159,13 +160,13 @@ def fit(
 ) -> dict[int, Estimate]:
     """Estimate some of the parameters, by their positions among all.
 
-    Those that are not determined are estimated once, and keep their first values while the others
+    Undetermined parameters are estimated once, and keep their first values while the others
     are estimated again: the fit must agree with a configuration that keeps them.
 
     Args:
         real: Statistics of the recordings, [n, all]; NaN = not measurable.
         simulate: Simulation of the statistics at some positions, as ``Simulate``.
-        axes: Of all parameters.
+        axes: Axes of all parameters.
         start: First values of all parameters.
         used: Positions to estimate.
     """
@@ -189,7 +190,7 @@ def estimate_with_spread(
 ) -> list[Estimate]:
     """Estimate parameters, and again with their spread in the simulation if there is any.
 
-    The spread is that of the first estimate, relative to a simulation with constant parameters.
+    The spread is taken from the first estimate, relative to a simulation with constant parameters.
     """
     solution = solve(real, simulate, axes, start)
     found = estimate(real, solution, axes)
@@ -236,10 +237,10 @@ def solve(
     Args:
         real: Statistics of the recordings, [n, k]; NaN = not measurable.
         simulate: Simulation of the same statistics.
-        axes: Of the k parameters.
+        axes: Axes of the k parameters.
         start: Parameters of the configuration [k], the mean of the prior.
         slopes: Derivatives of the statistics [k, k] where they are known; None = measured.
-        first: Parameters [k] at which the search begins; None = those of ``_search_in_turn``.
+        first: Parameters [k] at which the search begins; None = ``_search_in_turn``.
     """
     from scipy.optimize import least_squares
 
@@ -329,7 +330,7 @@ def _gain(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Regularised inverse of the derivatives, and which parameters are determined.
 
-    The inverse is that of a linear model with normal errors of the means and a normal prior.
+    It is the inverse of a linear model with normal errors of the means and a normal prior.
     """
     plausible = np.array([axis.plausible for axis in axes])
     weight = 1.0 / (_variance_of_mean(real) + _variance_of_mean(simulated))
@@ -359,7 +360,7 @@ def estimate(real: Array, solution: Solution, axes: Sequence[Axis]) -> list[Esti
     Intervals are standard errors by bootstrap (Efron, "Bootstrap methods: another look at the
     jackknife", Annals of Statistics 7, 1979) times Student's quantile for n - 1, and the
     root of n / (n - 1) that corrects the narrowness of bootstrap errors of small samples
-    (Hesterberg, "What teachers should know about the bootstrap", The American Statistician 2015).
+    (Hesterberg, The American Statistician 69, 2015).
 
     See ``_spreads`` for the spread.
     """

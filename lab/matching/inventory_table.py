@@ -1,4 +1,4 @@
-"""What was read of a folder, and what was skipped for which reason, as rows of text."""
+"""Files of a folder that were read, and files that were skipped, by reason, as rows of text."""
 
 from gen_data.lab.matching.real_files import Inventory
 

@@ -17,7 +17,7 @@ from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 Progress = Callable[[str], None]
 SCENES_MAX = 12
-"""Each candidate renders its scenes anew."""
+"""Each candidate renders its scenes again."""
 NO_LABELS = "no labels in annotations/*.json (COCO) or label_2/*.txt (KITTI)"
 
 

@@ -60,7 +60,7 @@ def _row(quantity: LidarQuantity, found: Estimate | None, before: float) -> resu
 
 
 def _start(own: Array, real: Array) -> Array:
-    """First parameters: limits show only if they are near what there is to see."""
+    """First parameters: limits show only if they are near the recorded values."""
     start: Array = own.copy()
     reach, dark = LIDAR.index(lidar_range.RANGE), LIDAR.index(DARK_RETURNS)
     start[reach] = min(own[reach], real[reach] + 0.5 * lidar_range.RANGE.axis.step)

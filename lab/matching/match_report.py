@@ -31,8 +31,8 @@ def _files(match: Match) -> Table:
 def _quantities(rows: Sequence[FittedQuantity]) -> Table:
     header = ("quantity", "before", "fitted", "95 %", "spread", "unit", "n", "enough", "remark")
     note = (
-        "Spread: standard deviation between recordings, beyond that of the scenes. Enough: number"
-        " of recordings for an interval that is narrow enough for most uses."
+        "Spread: standard deviation between recordings, beyond the scenes' deviation. Enough:"
+        " number of recordings for an interval that is narrow enough for most uses."
     )
     return Table("Fit", header, tuple(map(_quantity, rows)), note)
 

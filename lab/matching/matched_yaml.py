@@ -1,4 +1,4 @@
-"""The configuration that a fit writes: it extends the fitted one by what was fitted."""
+"""The configuration that a fit writes: it extends the source by the fitted values."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +37,7 @@ def format_config(match: Match, out: Path) -> str:
 
 
 def _base(source: str, out: Path) -> str:
-    """What ``extends`` names: a file relative to the new one, or a shipped name."""
+    """The value of ``extends``: a file relative to the new one, or a shipped name."""
     if not Path(source).expanduser().is_file():
         return source
     target = Path(source).expanduser().resolve()

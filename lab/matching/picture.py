@@ -20,7 +20,7 @@ _LINEAR: asset_types.Float32 = colorimetry.srgb_decode(np.arange(256) / 255.0).a
 
 
 class Picture:
-    """An sRGB image with what statistics derive from it, computed on demand.
+    """An sRGB image with the derived data for statistics, computed on demand.
 
     Attributes:
         rgb: uint8 [h, w, 3].
@@ -56,8 +56,8 @@ class Picture:
     def noise_blocks(self) -> tuple[se3.Array, se3.Array, se3.Array]:
         """Mean grey value, variance of noise and squared gradient of blocks, float64 [blocks].
 
-        Variances are those of Immerkaer's mask, which is blind to slopes ("Fast noise variance
-        estimation", Computer Vision and Image Understanding 64, 1996); gradients are those of the
+        Variances are measured with Immerkaer's mask, which is blind to slopes ("Fast noise variance
+        estimation", Computer Vision and Image Understanding 64, 1996); gradients are taken from the
         smoothed image.
         """
         rough = cv2.filter2D(self.grey, cv2.CV_32F, _MASK)

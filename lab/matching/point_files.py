@@ -89,7 +89,7 @@ def _read_ply(data: bytes) -> NDArray[np.void]:
 def _records(
     body: bytes, layout: np.dtype[np.void], points: int, is_text: bool, encoding: str
 ) -> NDArray[np.void]:
-    """Records of a body; ValueError if it is shorter than its header says, or encoded otherwise."""
+    """Records of a body; ValueError if shorter than its header states, or encoded otherwise."""
     if is_text:
         table = np.loadtxt(io.BytesIO(body), max_rows=points, ndmin=2)
         records = np.zeros(len(table), layout)

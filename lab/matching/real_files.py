@@ -1,4 +1,4 @@
-"""Files of a folder of recordings: which are photographs, scans and labels, and what they hold.
+"""Photographs, scans and labels in a folder of recordings, and their contents.
 
 Anything else is skipped, and counted with the reason. Folders of label images, named like a channel
 of a camera (``depth``, ``instance``), are left out, and so are further links to the same file.
@@ -36,7 +36,7 @@ BLOCK_PX = 8
 
 @dataclass
 class Inventory:
-    """What was found, used and skipped.
+    """Files that were found, used and skipped.
 
     Attributes:
         found: Number of files by kind.
@@ -76,7 +76,9 @@ def find_files(folder: Path) -> RealFiles:
         StorageError: there is no such folder, or it holds neither photographs nor scans.
     """
     if not folder.is_dir():
-        raise StorageError(f"{folder}: is no folder; expected one with photographs or laser scans")
+        raise StorageError(
+            f"{folder}: is not a folder; expected one with photographs or laser scans"
+        )
     seen: set[tuple[int, int]] = set()
     photos, scans, coco, kitti = [], [], [], []
     for path in sorted(folder.rglob("*")):
@@ -113,7 +115,7 @@ def choose_evenly(files: Sequence[T], limit: int) -> list[T]:
 
 
 def read_photos(files: RealFiles, limit: int, inventory: Inventory) -> Iterator[Photo]:
-    """Read photographs one after the other; those that cannot be used are counted."""
+    """Read photographs one after the other; unusable ones are counted."""
     inventory.found["photographs"] = len(files.photos)
     sizes: Counter[tuple[int, int]] = Counter()
     for path in choose_evenly(files.photos, limit):
@@ -198,7 +200,7 @@ def _middle(rgb: UInt8) -> UInt8:
 
 
 def read_scans(files: RealFiles, limit: int, inventory: Inventory) -> Iterator[Scan]:
-    """Read scans one after the other; those that cannot be used are counted."""
+    """Read scans one after the other; unusable ones are counted."""
     inventory.found["scans"] = len(files.scans)
     scaled = 0
     for path in choose_evenly(files.scans, limit):

@@ -20,9 +20,9 @@ class FittedQuantity:
     """One quantity and its fit.
 
     Attributes:
-        name, unit: Of the quantity.
-        path: Of its field in the configuration; empty = it has none.
-        statistic: What was measured.
+        name, unit: Name and unit of the quantity.
+        path: Path of its field in the configuration; empty = it has none.
+        statistic: The measured statistic.
         before: Typical value of the configuration; None = it has none.
         value: Fitted value in YAML, a number or a distribution. None = none was fitted; for JPEG,
             no compression.
@@ -87,10 +87,10 @@ class Match:
     """Result of a fit.
 
     Attributes:
-        folder: Of the recordings.
+        folder: Folder of the recordings.
         source: Configuration as given.
         resolved: The configuration as plain data.
-        inventory: What was read and skipped.
+        inventory: Files that were read and skipped.
         scenes: Number of simulated scenes.
     """
 
@@ -142,11 +142,11 @@ def fitted_quantity(
     """Row of an estimate.
 
     Args:
-        quantity: What was estimated.
+        quantity: The estimated quantity.
         found: Its estimate.
-        before: Coordinate of the configuration's own value.
+        before: Coordinate of the configuration's value.
         value: Fitted value in YAML.
-        path: Of its field.
+        path: Path of its field.
     """
     varies = quantity.axis.varies
     notes = (
@@ -184,6 +184,6 @@ def interval(
 
 
 def spread_of(found: Estimate, to_value: Callable[[float], float]) -> float:
-    """Standard deviation in the parameter's unit, from that of its coordinate."""
+    """Standard deviation in the parameter's unit, from the deviation of its coordinate."""
     below, above = (to_value(found.mean + sign * found.spread) for sign in (-1.0, 1.0))
     return 0.5 * (above - below)

@@ -1,7 +1,7 @@
 """Simulated recordings: scenes of a configuration, captured with candidate parameters.
 
 Scenes are rendered once, up to the light that enters a camera and the surfaces that laser rays hit.
-What candidates change comes after: photographs are developed and returns detected again, with the
+The candidates' changes come after: photographs are developed and returns detected again, with the
 same random streams for all candidates.
 """
 
@@ -73,7 +73,7 @@ class Simulated:
 
 
 class _RecordedHits:
-    """A renderer whose rays hit what they hit before."""
+    """A renderer whose rays repeat recorded hits."""
 
     def __init__(self, hits: LidarHits) -> None:
         self.hits = hits
@@ -213,7 +213,7 @@ def measure_exposures(
 def _dither(scenes: int, grids: Sequence[float]) -> se3.Array:
     """Offsets [scenes, k] of parameters that the pipeline rounds to multiples; 0 = it does not.
 
-    They are spread evenly over a step, so that the mean of the rounded values is the parameter, and
+    They are spread evenly over a step: the mean of the rounded values is the parameter, and
     mean statistics change steadily with it (dither: Schuchman, "Dither signals and their effect on
     quantization noise", IEEE Transactions on Communication Technology 12, 1964). Multiples of the
     golden ratio are even, however many there are.

@@ -1,8 +1,8 @@
-"""Rounds of a curriculum: configurations that draw more of what a detector missed.
+"""Rounds of a curriculum: configurations that draw more of the objects that a detector missed.
 
 A curriculum is a folder with ``curriculum.yaml`` and one configuration per round. Each
-configuration extends the one before by new weights, so that ``gen-data --config`` makes the data of
-any round again, byte for byte.
+configuration extends the one before by new weights: ``gen-data --config`` makes the data of any
+round again, byte for byte.
 """
 
 import hashlib
@@ -114,7 +114,7 @@ def adapt(
 
 
 def _check_same(loaded: "Config", data: Path) -> None:
-    """Refuse a data set of another configuration; what plans add or exports change may differ."""
+    """Refuse a data set of another configuration; changes by plans or exports are allowed."""
     free = ("seed", "exporters", "physics", "shard_size")
     stored = load_config(str(data))
     first, second = (
@@ -170,7 +170,7 @@ def _read_checked(path: Path, judged: StoredSamples, truth: RealSet) -> list[dic
     if isinstance(content, Mapping):
         if content.get("dataset", identity) != identity:
             raise ConfigError(
-                f"{path}: has results of the data set {content['dataset']}; expected those of "
+                f"{path}: has results of the data set {content['dataset']}; expected results of "
                 f"{identity} in {judged.folder}"
             )
         content = content.get("results")
@@ -282,7 +282,7 @@ def _format_config(
         for key in keys[1:-1]:
             item = item.setdefault(key, {})
         item[keys[-1]] = weights
-    title = f"# Round {number}: more of what was missed, within what {config} declares.\n"
+    title = f"# Round {number}: more of the missed objects, within the ranges of {config}.\n"
     return title + _to_yaml(document)
 
 

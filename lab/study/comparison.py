@@ -1,8 +1,8 @@
 """How much better or worse a variant is than the baseline, with its uncertainty.
 
-Two things vary: which pictures were collected, and the seed of data and training. Pictures are
+Two choices vary: which pictures were collected, and the seed of data and training. Pictures are
 resampled (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993), the same ones for every
-run, so that pictures that are hard for all do not count; seeds vary by their sample variance. Each
+run, to exclude pictures that are hard for all; seeds vary by their sample variance. Each
 deviation is multiplied by Student's t for its degrees of freedom, and the squares are added. With
 few seeds, the degrees of freedom of Welch and Satterthwaite would make intervals that hold the true
 value in 92 instead of 95 of 100 cases; these hold it in 95 to 97.
@@ -82,11 +82,11 @@ def interval(scores: Scores, confidence: float = CONFIDENCE) -> Interval:
     """Mean over seeds with its interval; with one seed, seeds are taken not to vary.
 
     Deviations of resampled means are too small by the root of (n - 1) / n for n pictures, which is
-    corrected (Hesterberg, "What teachers should know about the bootstrap", The American
-    Statistician 2015), and they have the degrees of freedom of n values.
+    corrected (Hesterberg, The American Statistician 69, 2015), and they have the degrees of freedom
+    of n values.
 
     Args:
-        scores: Of a variant, or differences of two.
+        scores: Scores of a variant, or differences of two.
         confidence: Share of such intervals that contain the true value.
     """
     from scipy.optimize import brentq

@@ -40,7 +40,7 @@ def convolve(inner: int, outer: int, stride: int = 1) -> nn.Sequential:
 
 
 class Residual(nn.Module):
-    """Two convolutions beside an identity (He et al., 2016)."""
+    """Two convolutions parallel to an identity (He et al., 2016)."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
@@ -107,7 +107,7 @@ class Detector(nn.Module):
 
     @staticmethod
     def load(path: Path) -> "Detector":
-        """Read a file of ``save``, ready to detect. Raises ConfigError if it is no such file."""
+        """Read a file of ``save``, ready to detect. Raises ConfigError if it is not such a file."""
         try:
             content = torch.load(path, weights_only=True)
             model = Detector(content["classes"], content["size_px"], content["width"])

@@ -1,6 +1,6 @@
-"""COCO's average precision of detections, for any choice of pictures, and what was missed.
+"""COCO's average precision of detections, for any choice of pictures, and missed objects.
 
-The figures are those of pycocotools, which COCO's own evaluation uses.
+The figures are pycocotools' figures, which COCO's own evaluation uses.
 """
 
 import contextlib
@@ -115,7 +115,7 @@ def read_results(path: Path, real: RealSet) -> list[dict[str, Any]]:
     """Read a file of COCO results of any detector on the pictures of a real set.
 
     Raises:
-        ConfigError: it is no such file, or results of other pictures or classes.
+        ConfigError: it is not such a file, or results of other pictures or classes.
     """
     try:
         return check_results(json.loads(path.read_text(encoding="utf-8")), path, real)
@@ -175,9 +175,9 @@ class Match:
     Attributes:
         picture: Number of the picture in the evaluation.
         thing: The object; None = a false alarm.
-        box: Of the detection that found it, or of the false alarm; None = missed.
+        box: Box of the detection that found it, or of the false alarm; None = missed.
         name: Class of the object or false alarm.
-        score: Of that detection; 0 = missed.
+        score: Score of that detection; 0 = missed.
     """
 
     picture: int

@@ -1,7 +1,7 @@
 """Runs of an experiment: data, training and detections of every variant and seed, resumable.
 
-A folder holds one experiment. Each run writes its detections last and in one step, so that a run
-is either done or repeated: data sets resume by themselves, and trainings take minutes.
+A folder holds one experiment. Each run writes its detections last and in one step: a run is either
+done or repeated. Data sets resume by themselves, and trainings take minutes.
 """
 
 import hashlib
@@ -53,7 +53,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is compared on what.
+    """Compared variants, and the pictures that compare them.
 
     Attributes:
         folder: Folder of real pictures.
@@ -118,8 +118,8 @@ class Run:
     """One variant with one seed.
 
     Attributes:
-        folder: Of its detector and detections.
-        data: Of the data set that it trains on, which equal configurations share.
+        folder: Folder of its detector and detections.
+        data: Folder of the data set that it trains on, which equal configurations share.
     """
 
     variant: Variant
@@ -180,7 +180,7 @@ def prepare(experiment: Experiment) -> Prepared:
 
 
 def list_runs(prepared: Prepared, out: Path) -> list[Run]:
-    """All runs, those of the first seed first: an unfinished experiment compares all variants."""
+    """All runs, the first seed first: an unfinished experiment compares all variants."""
     variants = prepared.experiment.variants
     settings = [(v.config, v.overrides, v.without) for v in variants]
     return [
@@ -234,7 +234,7 @@ def _classes(variant: Variant) -> tuple[str, ...]:
 
 
 def _claim(prepared: Prepared, out: Path) -> None:
-    """Write what the folder is for; refuse a folder of another experiment."""
+    """Write the purpose of the folder; refuse a folder of another experiment."""
     experiment = prepared.experiment
     stated = {
         **{key: value for key, value in asdict(experiment).items() if key != "folder"},

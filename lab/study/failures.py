@@ -1,4 +1,4 @@
-"""What a detector misses, by size, occlusion, brightness and class, and where it fails most."""
+"""Misses of a detector by size, occlusion, brightness and class, and where it fails most."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Findings of a study: average precision and what is missed, as data and tables."""
+"""Findings of a study: average precision and missed objects, as data and tables."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -80,13 +80,13 @@ def build(
     workers: int | None = None,
     report: Callable[[str], None],
 ) -> list[int]:
-    """Generate the data set of every step, or what is missing of them.
+    """Generate the data set of every step, or the missing samples of them.
 
     Returns:
         Samples of each step whose objects stand where they stand at the first step.
 
     Raises:
-        ConfigError: the factor is no field, a value is impossible, or no step writes COCO.
+        ConfigError: the factor is not a field, a value is impossible, or no step writes COCO.
         StorageError: the folder holds another ladder.
     """
     facts = {"factor": ladder.factor, "values": list(ladder.values), "config": str(config), "n": n}

@@ -26,7 +26,7 @@ class RealPicture:
     """A picture with its objects.
 
     Attributes:
-        image_id: Its id in results: that of COCO's file, or a number from 1 in KITTI's order.
+        image_id: Its id in results: the id in COCO's file, or a number from 1 in KITTI's order.
         size_px: Width and height.
         scan: Points of KITTI's laser scanner; None = there are none.
     """
@@ -40,13 +40,13 @@ class RealPicture:
 
 @dataclass(frozen=True)
 class RealSet:
-    """What was read of a folder.
+    """Pictures and labels read from a folder.
 
     Attributes:
         source: The annotation file, or KITTI's folder of labels.
         pictures: Pictures that can be read, ordered by their id.
         category_ids: Ids of the classes in results.
-        skipped: Numbers of what was left out, by reason.
+        skipped: Numbers of pictures and labels left out, by reason.
         layout: One of ``LAYOUTS``.
     """
 
@@ -165,7 +165,7 @@ def check_judges(real: RealSet) -> None:
     if len(real.pictures) < 2:
         reasons = ", ".join(f"{count} x {reason}" for reason, count in real.skipped.items())
         raise ConfigError(
-            f"{real.source}: 1 picture can be used; expected at least 2, so that scores have an "
+            f"{real.source}: 1 picture can be used; expected at least 2, to give scores an "
             f"interval, and better 200 (skipped: {reasons or 'none'})"
         )
     if not any(not thing.is_ignored for picture in real.pictures for thing in picture.objects):
@@ -232,7 +232,7 @@ LAYOUTS: Mapping[str, Callable[[Path, str | None, int | None], Found]] = {
 
 
 def _is_instances(path: Path) -> bool:
-    """Whether a file can hold annotations of boxes: not those of keypoints, nor other JSON."""
+    """Whether a file can hold annotations of boxes: not of keypoints, nor other JSON."""
     with path.open("rb") as file:
         head = file.read(4096)
     if "keypoints" in path.stem:
@@ -298,8 +298,8 @@ def _read_coco(root: Path, paths: Sequence[Path], most: int | None) -> RealSet:
 def _find_images(root: Path, annotations: Path, names: Sequence[str]) -> list[Path]:
     """Images by their names in an annotation file; a path without a file where there is none.
 
-    Of several with one name, those in ``<split>/`` win, then those in the fewest folders: an export
-    holds depth and label images of the same names in folders of their own.
+    Of several with one name, images in ``<split>/`` win, then images in the fewest folders: an
+    export holds depth and label images of the same names in separate folders.
     """
     known: dict[str, list[Path]] = {}
     for path in sorted(root.rglob("*.*")):

@@ -1,4 +1,4 @@
-"""Parameters that a detector's misses depend on, and distributions with more of what is missed.
+"""Parameters that a detector's misses depend on, and distributions with more missed objects.
 
 The values of a parameter are divided into bins that the declared distribution fills equally. Where
 the share of missed objects differs between bins by more than chance, the weight of each bin is
@@ -41,7 +41,7 @@ PRIOR_OBJECTS = 20.0
 LEAST, MOST = 0.25, 4.0
 """Limits of the factor of a bin: everything declared is still drawn."""
 PERMUTATIONS_MAX = 9999
-"""Enough for a p of 0.0001, so that one of some hundred parameters can be found."""
+"""Enough for a p of 0.0001, to find one of some hundred parameters."""
 BEYOND_MAX = 20
 """Permutations beyond the measured spread that end a test (Besag, Clifford, Biometrika 1991)."""
 ALPHA = 0.05
@@ -50,7 +50,7 @@ ALPHA = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """Objects of a sample, and those that the detector missed."""
+    """Objects of a sample, and the ones that the detector missed."""
 
     objects: int
     missed: int
@@ -65,7 +65,7 @@ class Dependence:
         declared: Its distribution.
         parts: Distributions of the bins, with their declared probabilities.
         objects, missed: By bin.
-        p: Of a permutation test, adjusted for the number of parameters.
+        p: p-value of a permutation test, adjusted for the number of parameters.
     """
 
     name: str
@@ -105,10 +105,10 @@ class Dependence:
 
 
 def find_dependences(draws: Sequence[Drawn], tallies: Mapping[int, Tally]) -> list[Dependence]:
-    """Test every parameter whose weights can be changed, those with the smallest p first.
+    """Test every parameter whose weights can be changed, in rising order of p.
 
-    Left out are parameters with several distributions (that depend on shared values), and those
-    over rotations, directions, positions and sequences.
+    Left out are parameters with several distributions (that depend on shared values), and
+    parameters over rotations, directions, positions and sequences.
 
     Args:
         draws: All draws of a data set.

@@ -1,4 +1,4 @@
-"""A process that trains the small detector as a task file says, and writes its detections."""
+"""A process that trains the small detector by a task file, and writes its detections."""
 
 import json
 import sys
@@ -21,7 +21,7 @@ KEPT_SCALE = 1.25
 
 
 def perform_task(path: Path) -> None:
-    """Train, save the detector beside the task, and write the detections last."""
+    """Train, save the detector next to the task, and write the detections last."""
     task: dict[str, Any] = json.loads(path.read_text("utf-8"))
     torch.set_num_threads(1)
     torch.manual_seed(task["seed"])

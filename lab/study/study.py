@@ -23,7 +23,7 @@ def run_study(
     workers: int | None = None,
     report: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Train all variants of an experiment, or what is missing, and compare them.
+    """Train all variants of an experiment, or the missing ones, and compare them.
 
     Args:
         experiment: Variants, real pictures and sizes.
@@ -58,7 +58,7 @@ def compare_results(
     """Compare COCO results of any detectors on the same real pictures; the first is the baseline.
 
     Raises:
-        ConfigError: a file has no COCO results, or those of other pictures.
+        ConfigError: a file has no COCO results, or results of other pictures.
     """
     real = read_real(folder, split)
     check_judges(real)
@@ -95,7 +95,7 @@ def _skipped(real: RealSet) -> Table:
         rows.append(["pictures of other sizes", str(sum(c for _, c in sizes.most_common()[5:]))])
     rows += [[f"skipped: {reason}", str(count)] for reason, count in real.skipped.items()]
     return {
-        "title": "what was read",
+        "title": "read files",
         "header": ["", "count"],
         "rows": rows,
         "note": str(real.source),

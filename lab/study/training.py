@@ -34,7 +34,7 @@ def fit(
         model: Changed in place.
         batches: As many as are needed.
         used: Share of the training that is over before a step, by its number; 1 ends it.
-        seed: Of the augmentation.
+        seed: Seed of the augmentation.
         report: Called with number and loss of every twentieth step.
     """
     rng = Streams(seed, 0).rng("study/augmentation")

@@ -189,7 +189,7 @@ class ModelCommand:
                 self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
             )
         except (OSError, ValueError, IndexError) as error:
-            fact = getattr(error, "strerror", None) or "is no command"
+            fact = getattr(error, "strerror", None) or "is not a command"
             raise ConfigError(f"--command: '{name}': {fact}") from None
         assert process.stdin is not None
         assert process.stdout is not None
@@ -260,5 +260,5 @@ def _limited(timeout_s: float, stop: Callable[[], None]) -> Iterator[Callable[[]
 
 
 def _shown(place: urllib.parse.SplitResult) -> str:
-    """A URL without what may be secret."""
+    """A URL without possible secrets."""
     return f"{place.scheme}://{place.netloc.rpartition('@')[2]}{place.path}"[:_ERROR_CHARS]

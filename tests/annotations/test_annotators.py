@@ -308,8 +308,8 @@ def test_a_silhouette_that_was_not_rendered_stops_the_sample() -> None:
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
-        ({"T_world_instance": SE3((0.0, math.nan, 0.0))}, "no rigid pose"),
-        ({"T_world_instance": SE3((0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0))}, "no rigid pose"),
+        ({"T_world_instance": SE3((0.0, math.nan, 0.0))}, "not rigid"),
+        ({"T_world_instance": SE3((0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0))}, "not rigid"),
         ({"box_max_m": (-0.2, 0.2, 1.0)}, "has the size"),
         ({"box_max_m": (math.inf, 0.2, 1.0)}, "has the size"),
         ({"box_min_m": (0.0, 0.0, 0.0), "box_max_m": (0.0, 0.0, 0.0)}, "has the size"),
@@ -354,7 +354,7 @@ class _Liar:
         ({"visible_fraction": 1.01}, "visible_fraction is 1.01"),
         ({"occlusion": -0.1}, "occlusion is -0.1"),
         ({"truncation": math.nan}, "truncation is nan"),
-        ({"T_camera_object": SE3((0.0, 0.0, 1.0), (1.0, 0.1, 0.0, 0.0))}, "no rigid pose"),
+        ({"T_camera_object": SE3((0.0, 0.0, 1.0), (1.0, 0.1, 0.0, 0.0))}, "not a rigid pose"),
         ({"keypoints": (keypoint((20.0, 3.0), 2),)}, "'tip' at .* px is not in the image"),
         ({"keypoints": (keypoint((2.0, 3.0), 0),)}, "'tip' is not in the image and has a place"),
         ({"keypoints": (keypoint((2.0, math.nan), 1),)}, "'tip' is nowhere"),

@@ -116,7 +116,7 @@ def test_small_objects_win_over_large_ones_and_over_the_background() -> None:
     ("fields", "message"),
     [
         ({"size_m": (500, 500, 50), "voxel_m": 0.05}, r"100,000,000,000 voxels need 1200\.0 GB"),
-        ({"size_m": (80, 80, 6.5)}, r"6\.5 m is no multiple of voxel_m, 0\.4 m"),
+        ({"size_m": (80, 80, 6.5)}, r"6\.5 m is not a multiple of voxel_m, 0\.4 m"),
         ({"size_m": (0.1, 80, 6.4)}, "less than a voxel along an axis"),
     ],
 )

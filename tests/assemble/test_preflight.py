@@ -81,7 +81,7 @@ def test_cameras_without_a_rig_are_no_stereo_pair() -> None:
         )
     )
 
-    assert "sensors[0].stereo_with: 'left' and 'right' are no rectified pair: " in message
+    assert "sensors[0].stereo_with: 'left' and 'right' are not a rectified pair: " in message
     assert "mount them on one rig" in message
 
 
@@ -95,7 +95,7 @@ def test_pairs_on_a_rig_are_compared(right: dict[str, Any], fault: str) -> None:
     left = {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"}
     message = refusal(cart(left, {**CAMERA, "name": "right", **right}))
 
-    assert "'left' and 'right' are no rectified pair: " in message
+    assert "'left' and 'right' are not a rectified pair: " in message
     assert fault in message
 
 
@@ -105,7 +105,7 @@ def test_a_pair_whose_mounting_varies_is_refused() -> None:
     right = {**CAMERA, "name": "right", "offset_m": [1.0, -0.1, 0.9]}
     varied = [{"type": "rig_calibration", "name": "mounts"}]
 
-    assert "no rectified pair" in refusal(cart(left, right, randomizers=varied))
+    assert "not a rectified pair" in refusal(cart(left, right, randomizers=varied))
     check(cart(left, right))
 
 
@@ -131,7 +131,7 @@ def test_plan_and_generate_refuse_all_faults_with_the_same_message(tmp_path: Pat
     with pytest.raises(ConfigError) as generated:
         gen_data.generate(file, 2, out=tmp_path / "out", workers=0)
 
-    assert "no rectified pair" in str(generated.value)
+    assert "not a rectified pair" in str(generated.value)
     assert "exporter 'bop': camera 'left' has a lens" in str(generated.value)
     assert str(planned.exception) == str(generated.value)
     assert not (tmp_path / "out").exists()

@@ -104,7 +104,7 @@ def _sides(mesh: MeshData, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(
     ("text", "message"),
     [("paved_area?relief=1,2,3", "expected at=x,y,yaw,scale"),
-     ("paved_area?at=0,0,0,1&relief=1,2,3", "3 numbers are no relief; expected 20 per road"),
+     ("paved_area?at=0,0,0,1&relief=1,2,3", "3 numbers are not a relief; expected 20 per road"),
      ("car?at=0,0,0,1&relief=1,2,3", "has no parameter")],
 )  # fmt: skip
 def test_wrong_ids_are_refused(library: Library, text: str, message: str) -> None:

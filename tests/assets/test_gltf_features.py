@@ -170,7 +170,7 @@ def test_bytes_after_a_binary_file(builder: Builder, tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(whole + b"\0\0\0")
     assert read_mesh(Folder(tmp_path), "a.glb").remarks == ("3 bytes after its end are not read",)
     (tmp_path / "a.glb").write_bytes(whole[:-1])
-    with pytest.raises(AssetError, match="its header says version 2"):
+    with pytest.raises(AssetError, match="its header states version 2"):
         read_mesh(Folder(tmp_path), "a.glb")
 
 

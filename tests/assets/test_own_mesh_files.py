@@ -220,7 +220,7 @@ def test_a_colour_beside_an_image_of_ply_is_named(tmp_path: Path, color: str, to
         f"element face 1\nproperty list uchar int vertex_indices\nend_header\n{corners}3 0 1 2\n"
     )
     remarks = read_mesh(Folder(tmp_path), "a.ply").remarks
-    assert remarks.count("vertex and face colours are not used beside an image") == told
+    assert remarks.count("vertex and face colours are not used next to an image") == told
 
 
 def test_ply_images_with_texture_coordinates_of_corners_and_triangle_strips(tmp_path: Path) -> None:

@@ -224,7 +224,7 @@ DAMAGES: dict[Callable[[Path], None], tuple[set[str], set[str], dict[str, str]]]
     mirror_export_picture: (
         {"exports", "written again"},
         set(),
-        {"exports: coco": "sample 7, color: its picture is not that of the data set$"},
+        {"exports: coco": "sample 7, color: its picture differs from the data set's$"},
     ),
     exchange_pictures: (
         {"generated again"},
@@ -238,7 +238,7 @@ DAMAGES: dict[Callable[[Path], None], tuple[set[str], set[str], dict[str, str]]]
     move_body: ({"draws", "generated again"}, RAYS, {}),
     copy_scene: ({"splits", "draws", *AGAIN}, RAYS, {"splits": r"scenes 0 \(\w+\) and \d+ "}),
     scale_depth: ({"pixels", *AGAIN}, set(),
-                  {"pixels: color": ".*a ray does not meet what is stated"}),
+                  {"pixels: color": ".*a ray does not meet the stated surface"}),
     move_points: (
         {"laser points", "generated again"}, set(),
         {"laser points: pseudo_lidar": ".*a ray does not meet instance"},

@@ -101,7 +101,7 @@ CUP, BOWL = thing("cup", 1, 2, 11, 22), thing("bowl", 30, 5, 40, 9)
         ([image(0, CUP, BOWL, split="val")],
          ["sample 0, color: is in the split val, expected train"]),
         ([], ["sample 0, color: is missing"]),
-        ([image(0, CUP, BOWL), image(7)], ["sample 7, color: is no image of the data set"]),
+        ([image(0, CUP, BOWL), image(7)], ["sample 7, color: is not an image of the data set"]),
         ([image(0, CUP, BOWL), image(0, CUP, BOWL)], ["sample 0, color: is there twice"]),
     ],
 )  # fmt: skip

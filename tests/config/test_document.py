@@ -159,8 +159,8 @@ NASTY = {
     "next line": ("a: 1\x85b: 2", "character U+0085 is not allowed"),
     "line separator": ("a: 1\u2028b: 2", "character U+2028 is not allowed"),
     "mark in the middle": ("a: \ufeff1", "character U+FEFF is not allowed"),
-    "self alias": ("a: &x [*x]", "alias *x stands inside what it names"),
-    "self alias in mapping": ("a: &x {b: {c: *x}}", "alias *x stands inside what it names"),
+    "self alias": ("a: &x [*x]", "alias *x is inside the node it refers to"),
+    "self alias in mapping": ("a: &x {b: {c: *x}}", "alias *x is inside the node it refers to"),
     "unknown alias": ("a: *x", "alias *x has no anchor &x before it"),
     "alias as key": ("a: &x b\n*x : 1", "a key must be plain text, got an alias"),
     "alias bomb": (
@@ -264,9 +264,9 @@ def test_what_is_no_readable_file_is_refused(tmp_path: Path) -> None:
     os.mkfifo(pipe)
     for path, fact in [
         (tmp_path / "absent.yaml", "cannot be read: No such file or directory"),
-        (tmp_path, "is no regular file"),
-        (pipe, "is no regular file"),
-        (Path("a\0b"), "is no file name"),
+        (tmp_path, "is not a regular file"),
+        (pipe, "is not a regular file"),
+        (Path("a\0b"), "is not a file name"),
     ]:
         with pytest.raises(ConfigError, match=fact):
             load_yaml(path)

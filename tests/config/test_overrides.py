@@ -73,7 +73,7 @@ def test_an_overridden_value_knows_that_it_came_from_the_command_line(document: 
          "clutter, finish (did you mean 'clutter'?)"),
         ("randomizers[3].count", "5", 12, "randomizers: has 3 items, no [3]"),
         ("seed.x", "1", 6, "seed: is 7, so it has no 'x'"),
-        ("a..b", "1", 2, "'a..b' is no path; expected something like a.b[0].c"),
+        ("a..b", "1", 2, "'a..b' is not a path; expected the form a.b[0].c"),
         ("", "1", 1, "an empty path"),
         ("camera.fov_deg", "[1, 2", 16, "camera.fov_deg[2]: not valid YAML: while parsing a flow "
          "sequence, did not find expected ',' or ']'"),

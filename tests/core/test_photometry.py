@@ -50,7 +50,7 @@ def test_a_sun_has_no_flux_and_a_ball_no_luminance() -> None:
 
     panel = Light("r", "rectangle", intensity_cd=60.0, size_m=(1.2, 0.5))
     assert photometry.luminance_cd_m2(panel) == pytest.approx(100.0)
-    with pytest.raises(ValueError, match="no panel"):
+    with pytest.raises(ValueError, match="not a panel"):
         photometry.luminance_cd_m2(SPHERE)
 
 

@@ -117,5 +117,5 @@ def test_numbers_of_a_relief_make_the_same_relief() -> None:
     """Asset ids hold them."""
     relief = Relief((CREST, CREST))
     assert Relief.of(relief.numbers()) == relief
-    with pytest.raises(ValueError, match="51 numbers are no relief"):
+    with pytest.raises(ValueError, match="51 numbers are not a relief"):
         Relief.of((*relief.numbers(), *(0.0,) * (51 - len(relief.numbers()))))

@@ -16,8 +16,14 @@ import yaml
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "tests/documents/english.yaml"
 DOCUMENTS = ("*.md", "docs/*.md", "docs/decisions/*.md", "docs/tutorials/*.md", "examples/**/*.md")
+FOLDERS = (
+    *("annotations", "api", "assemble", "assets", "cli", "config", "core", "physics", "pipeline"),
+    *("packs", "preview", "report", "roads", "rooms", "runner", "sensors", "sky", "traffic", "usd"),
+)
+LABORATORY = ("certificate", "environment", "matching", "study", "write")
 SOURCES = (
-    *(f"generator/{folder}/**/*.py" for folder in ("api", "cli", "config")),
+    *(f"generator/{folder}/**/*.py" for folder in FOLDERS),
+    *(f"lab/{folder}/**/*.py" for folder in LABORATORY),
     *(f"{folder}/**/*.py" for folder in ("randomizers", "scene_templates", "exporters")),
 )
 HISTORY = {"CHANGELOG.md", "docs/migration.md"}
@@ -35,7 +41,11 @@ TICS = {
 }
 """Patterns by name, without regard to capitals."""
 TIC = re.compile("|".join(f"(?:{tic})" for tic in TICS.values()), re.IGNORECASE | re.MULTILINE)
-CODE = re.compile(r"^```.*?^```$|`[^`\n]*`|\]\([^)\s]*\)", re.MULTILINE | re.DOTALL)
+CODE = re.compile(r"^```.*?^```$|``[^`\n]+``|`[^`\n]*`|\]\([^)\s]*\)", re.MULTILINE | re.DOTALL)
+PATH = re.compile(r"[\w.:]+")
+"""Keys, and names of modules and their objects."""
+NAME = re.compile(r"(?<=^        )\w+(?=: )", re.MULTILINE)
+"""Names of parameters and attributes in docstrings."""
 
 
 def files() -> list[Path]:
@@ -49,14 +59,17 @@ def name_of(path: Path) -> str:
 
 
 def prose(path: Path) -> str:
-    """Text of a document without code, or all strings of a module: docstrings and messages."""
+    """Text of a document, or all strings of a module (docstrings, messages), without code."""
     text = path.read_text("utf-8")
     if path.suffix == ".md":
         return CODE.sub("", text)
-    nodes = ast.walk(ast.parse(text))
-    return "\n".join(
-        node.value for node in nodes if isinstance(node, ast.Constant) and type(node.value) is str
+    strings = (
+        node.value
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Constant) and type(node.value) is str
     )
+    texts = "\n".join(text for text in strings if not PATH.fullmatch(text))
+    return NAME.sub("name", CODE.sub("", texts))
 
 
 def tics(text: str) -> Counter[str]:

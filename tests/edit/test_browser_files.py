@@ -76,7 +76,7 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
         tilt = card.locator("[data-standpoint=tilt_deg]")
         assert tilt.input_value() == "30"
         card.locator("[data-standpoint=height_m]").fill("1")
-        card.locator("[role=status]:has-text('room for things 1.2 m')").wait_for()
+        card.locator("[role=status]:has-text('room for objects 1.2 m')").wait_for()
         # It stays unsure, and shows no horizon, until the angle is given.
         status = card.locator("[role=status]").inner_text()
         assert "not sure how the camera looked" in status

@@ -101,7 +101,7 @@ def test_a_fitted_configuration_can_be_planned(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (("absent", "configs/base.yaml"), "absent: is no folder; expected one"),
+    (("absent", "configs/base.yaml"), "absent: is not a folder; expected one"),
     (("real", "configs/base.yaml", "--camera", "colour"), "--camera: there is no such sensor"),
     (("real", "configs/base.yaml", "--scenes", "1"), "scenes: 1 is too few; expected"),
     (("real", "configs/base.yaml", "--out", "a.txt"), "a.txt; expected a name"),

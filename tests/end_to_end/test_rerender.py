@@ -37,7 +37,7 @@ def test_it_is_repaired_from_the_scenes_that_it_has(dataset: Path, dark_dataset:
     before = digest(dark_dataset)
     (dark_dataset / "shards/000002.json").unlink()
 
-    with pytest.raises(ConfigError, match=r"are those of another data set.*--source"):
+    with pytest.raises(ConfigError, match=r"come from another data set.*--source"):
         repair(dark_dataset, workers=0)
     repair(dark_dataset, source=dataset, workers=0)
 

@@ -187,5 +187,5 @@ def test_an_unknown_container_is_refused(tmp_path: Path, monkeypatch: pytest.Mon
         Path(path).write_bytes(bytes(data))
 
     monkeypatch.setattr(rerun.chunk.ChunkStore, "write_rrd", other)
-    with pytest.raises(StorageError, match=r"unknown structure; expected those of rerun-sdk 0\.41"):
+    with pytest.raises(StorageError, match=r"expected the structure of rerun-sdk 0\.41"):
         write_recording(tmp_path / "a.rrd", [a_chunk()], "name")

@@ -60,5 +60,5 @@ def test_boxes_of_twice_the_size_need_half_the_distance_or_twice_the_share() -> 
     change = box_sizes.BOX_SIZES.change(config, "color", 1.0)
     assert (change.field, change.value) == ("fills", {"uniform": [0.4, 0.8]})
     config = parse_config(TABLETOP % "distance_m: 1", "x", "x")
-    with pytest.raises(NoParameter, match="camera_pose aims at things"):
+    with pytest.raises(NoParameter, match="camera_pose aims at objects"):
         box_positions.BOX_POSITIONS.change(config, "color", 1.0)

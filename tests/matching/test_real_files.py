@@ -63,7 +63,7 @@ def test_a_limit_chooses_files_evenly_and_folders_without_any_are_refused(tmp_pa
     files = [Path(str(k)) for k in range(10)]
     assert real_files.choose_evenly(files, 4) == [files[0], files[2], files[5], files[7]]
     assert real_files.choose_evenly(files, 100) == files
-    with pytest.raises(StorageError, match="is no folder"):
+    with pytest.raises(StorageError, match="is not a folder"):
         real_files.find_files(tmp_path / "absent")
     (tmp_path / "notes.txt").write_text("nothing")
     with pytest.raises(

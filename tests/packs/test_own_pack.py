@@ -110,7 +110,7 @@ def foreign(path: Path, comment: bytes, names: list[str]) -> str:
     ("comment", "names", "fact"),
     [
         (b"gen-data assets, format 2", ["a"], "is of format 2, newer than this gen-data; exp"),
-        (b"", ["a"], "is no pack; expected one that gen-data assets pack wrote"),
+        (b"", ["a"], "is not a pack; expected one that gen-data assets pack wrote"),
         (b"gen-data assets, format 1", ["a"], "inflates to more than 1 times its size"),
         (b"gen-data assets, format 1", ["../a"], "lies outside its folder|inflates"),
     ],

@@ -160,10 +160,10 @@ def test_tables_count_what_was_written(street: Path) -> None:
     assert row_of(made, "Distance and size", "person")["distance m"] == "13.0 / 13.0 / 13.0"
     points = row_of(made, "Keypoints", "person")
     assert (points["visible"], points["hidden"]) == ("50.0 %", "25.0 %")
-    car = row_of(made, "Beside KITTI", "Car")
+    car = row_of(made, "Compared with KITTI", "Car")
     assert (car["objects"], car["per image"], car["length m"]) == ("3", "1.00", "4.00")
     assert (car["KITTI 2"], car["KITTI 4"], car["KITTI 10"]) == ("28742", "3.84", "3.88")
-    assert row_of(made, "Beside KITTI", "Person_sitting")["objects"] == "1"
+    assert row_of(made, "Compared with KITTI", "Person_sitting")["objects"] == "1"
 
 
 def test_the_difficulties_are_those_of_the_devkit_and_counts_need_little_memory() -> None:
@@ -191,7 +191,7 @@ def test_the_command_prints_tables_and_writes_a_page(street: Path, tmp_path: Pat
     done = CliRunner().invoke(report, [str(street), "--html", str(html)])
     assert done.exit_code == 0, done.output
     assert "Occlusion and truncation" in done.output
-    assert "Beside KITTI" in html.read_text(encoding="utf-8")
+    assert "Compared with KITTI" in html.read_text(encoding="utf-8")
 
 
 def write_scan(folder: Path, name: str, rows: list[int], labels: str) -> None:

@@ -57,7 +57,7 @@ def test_the_card_counts_and_states_the_publication_or_licences_of_assets() -> N
     ):
         assert line in card
     bare = facts(Publication())
-    assert "The publisher has stated no licence of its own." in data_card(bare)
+    assert "The publisher has stated no licence." in data_card(bare)
     assert "## Publication" not in data_card(bare)
     metadata = json.loads(croissant_json(bare))
     assert (metadata["license"], metadata["name"]) == (["CC0-1.0", "MIT"], "fake")

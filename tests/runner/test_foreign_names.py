@@ -128,7 +128,7 @@ def test_a_data_set_id_that_is_a_path_is_refused(tmp_path: Path, memory: str) ->
     edit_manifest(tmp_path / "set", dataset_id="../../marker")
     publish(tmp_path / "set", memory)
     for open_set in (lambda: StoredObjects(memory), lambda: StoredSamples(tmp_path / "set")):
-        with pytest.raises(StorageError, match="dataset_id is no sha256"):
+        with pytest.raises(StorageError, match="dataset_id is not a sha256"):
             open_set()
     assert not list(tmp_path.rglob("marker"))
 

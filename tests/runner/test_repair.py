@@ -165,7 +165,7 @@ def test_a_plan_without_sums_is_restored_from_its_copy_by_its_configuration(data
     # Another configuration is refused, and nothing is changed.
     (dataset / "plan.json").write_text("{")
     damaged = tree_digest(dataset)
-    with pytest.raises(StorageError, match=r"not those of this data set; nothing was changed"):
+    with pytest.raises(StorageError, match=r"not this data set's; nothing was changed"):
         make(dataset, N + 1, SHARD_SIZE, settings=REPAIR)
     assert tree_digest(dataset) == damaged
 
@@ -178,7 +178,7 @@ def test_other_bytes_than_the_sealed_ones_are_never_sealed(dataset: Path) -> Non
         for path in (shard_dir / "color/rgb").iterdir():
             path.write_bytes(b"other")
 
-    with pytest.raises(DeterminismError, match=r"declared: shards/000001"):
+    with pytest.raises(DeterminismError, match=r"manifest\.json: shards/000001"):
         make(dataset, N, SHARD_SIZE, settings=Settings(write_media=write_others))
 
     assert not (dataset / "manifest.json").exists()

@@ -386,7 +386,7 @@ def test_a_camera_of_a_pair_tells_disparities() -> None:
 
 def test_cameras_that_are_no_pair_are_told_why() -> None:
     """Names, the fact and what to do."""
-    with pytest.raises(SampleError, match=r"'left' and 'right' are no rectified pair: .*one rig"):
+    with pytest.raises(SampleError, match=r"'left' and 'right' are not a rectified pair: .*rig"):
         stereo((0.1, 0.02, 0.0))
     with pytest.raises(ConfigError, match=r"there is no camera 'rihgt'.*did you mean 'right'"):
         stereo(of="rihgt")

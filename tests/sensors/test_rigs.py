@@ -256,5 +256,5 @@ def test_sensors_that_read_before_anything_moves_are_named(recwarn: Any) -> None
     warn_of_early_readings([late], 4)
     warn_of_early_readings([early], 1)
     assert not recwarn
-    with pytest.warns(ConfigWarning, match=r"sensors early: .*add 0\.02 to that of every sensor"):
+    with pytest.warns(ConfigWarning, match=r"early: .*add 0\.02 to time_offset_s of every sensor"):
         warn_of_early_readings([late, early], 4)

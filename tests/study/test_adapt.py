@@ -129,7 +129,9 @@ def test_what_a_detector_cannot_be_judged_by_is_refused(
     truth = json.loads((data / "coco/annotations/instances_train.json").read_text())["annotations"]
     path, none = tmp_path / "other.json", tmp_path / "none"
     name = StoredSamples(data).dataset_id
-    another = f"^{path}: has results of the data set 0123456789abcdef; expected those of {name} in "
+    another = (
+        f"^{path}: has results of the data set 0123456789abcdef; expected results of {name} in "
+    )
     for content, fact in (
         ({"dataset": "0123456789abcdef", "results": []}, rf"{another}{data}$"),
         ([*rows, rows[0] | {"image_id": 41}], "of another data set: the image_id 41 is not in"),

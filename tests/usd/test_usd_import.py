@@ -266,7 +266,7 @@ def test_bytes_that_are_no_crate_file_are_refused(tmp_path: Path) -> None:
     for name, cause in (
         ("half", "damaged or cut off"),
         ("noise", "damaged or cut off"),
-        ("word", "its content is no USD"),
+        ("word", "its content is not USD"),
         ("open", "syntax error at line 3"),
     ):
         with pytest.raises(AssetError, match=rf"unreadable USD.* \({cause}"):

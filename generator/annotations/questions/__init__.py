@@ -2,7 +2,7 @@
 
 A kind is a function ``(View) -> Iterator[Utterance]`` and a line in this table, or an entry point
 ``gen_data.question`` of another package. It states an answer only if its margin is at least the
-resolution of the sensor (``stated``), and asks for yes and no equally often (``View.asked``).
+resolution of the sensor (``stated``), and wants yes and no equally often (``View.asked``).
 """
 
 from collections.abc import Callable, Iterator

@@ -40,7 +40,7 @@ def pointing(view: View) -> Iterator[Utterance]:
 
 
 def free_spot(view: View) -> Iterator[Utterance]:
-    """A pixel of the bare top of a named support, in all and on each side of what is on it."""
+    """A pixel of the bare top of a named support: of all, and on each side of the objects on it."""
     forms = grammar()["questions"]["free_spot"]
     instances = {b.name: b.instance_id for b in view.scene.bodies}
     tops: dict[int, list[SupportSurface]] = {}
@@ -103,7 +103,7 @@ def _bare(view: View, number: int, top: SupportSurface) -> Mask:
 
 
 def occlusion(view: View) -> Iterator[Utterance]:
-    """What hides an object, and whether something does."""
+    """Which object hides another, and whether any does."""
     forms = grammar()["questions"]["occlusion"]
     for thing in view.spoken:
         hiders, whole_px, least = _hiders(view, thing)
@@ -126,7 +126,7 @@ def occlusion(view: View) -> Iterator[Utterance]:
 
 
 def _hiders(view: View, thing: Thing) -> tuple[dict[int, int], int, float]:
-    """Pixels that each instance hides of another, those of its silhouette, and the resolution.
+    """Pixels of an object that each other instance hides, of its silhouette, and the resolution.
 
     The silhouette is inside the image; instances without id hide as number 0.
     """

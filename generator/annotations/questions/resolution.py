@@ -3,8 +3,9 @@
 * An edge lies anywhere in its pixel: a rectangular distribution of one pixel, whose standard
   deviation is ``1 / sqrt(12)`` px (JCGM 100:2008, "Guide to the expression of uncertainty in
   measurement", 4.3.7). In space that is ``range * angle of the pixel / sqrt(12)`` across the ray.
-* Along the ray, a depth camera has the error of its own readings: the root mean square of measured
-  minus true depth over the object's visible pixels. Any other camera has that of the apparent size:
+* Along the ray, a depth camera has the error of its readings: the root mean square of measured
+  minus true depth over the object's visible pixels. Any other camera derives it from the apparent
+  size:
   ``z = f s / n``, therefore ``sigma_z = z sigma_n / n`` (5.1.2 of the guide; the triangulation
   ``sigma_z = z^2 sigma_d / (f b)`` of Khoshelham and Oude Elberink, Sensors 12, 2012, with the
   object as base), where n is the diagonal of the visible box and has two edges.
@@ -32,7 +33,7 @@ PIXEL = COVERAGE * math.sqrt(2.0) * EDGE_PX
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What a camera could measure of one object.
+    """A camera's best possible measurement of one object.
 
     Attributes:
         ray: Unit vector from the camera to the centre of its 3D box, world.
@@ -53,10 +54,10 @@ class Sight:
 
 
 def sight(reading: SensorReading, number: int, box: BoxPx, center_m: Array) -> Sight | None:
-    """What a camera could measure of an instance; None without a measurement of its depth.
+    """A camera's best measurement of an instance; None without a measurement of its depth.
 
     Args:
-        reading: Of the camera, with the channel INSTANCE.
+        reading: Reading of the camera, with the channel INSTANCE.
         number: Instance id.
         box: Around its visible pixels.
         center_m: Centre of its 3D box, world [3].

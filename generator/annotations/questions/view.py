@@ -223,7 +223,7 @@ def stated(
     measured: Measured,
     **more: Any,
 ) -> Iterator[Utterance]:
-    """A question with its answer, if its margin is at least what the sensor could measure."""
+    """A question with its answer, if its margin is at least the resolution of the sensor."""
     if measured.margin >= measured.resolution > 0.0:
         ids = tuple(t.instance_id for t in things)
         yield Utterance(kind, *text, ids, measured, **more)
@@ -244,7 +244,7 @@ def pixel_text(point_px: PointPx) -> str:
 
 
 def _ends(_view: View, thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[str, Words]]:
-    """Ends of a row of objects of one category: a mug beside a cup is no leftmost mug."""
+    """Ends of a row of objects of one category: a mug next to a cup is not the leftmost mug."""
     if {t.category for t in others} == {thing.category}:
         for side, word in (("left_of", "leftmost"), ("right_of", "rightmost")):
             if all(is_beside(thing, side, t) for t in others):

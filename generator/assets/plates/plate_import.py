@@ -46,7 +46,7 @@ def locate_camera(
     """Plate of a photograph with its camera only; its ground may be above the horizon.
 
     Args:
-        entry: Of the photograph.
+        entry: Entry of the photograph.
         data: Content of its file, for its EXIF data.
         rgb: Its pixels, uint8 [h, w, 3].
         place: Name of the file in messages.

@@ -1,4 +1,4 @@
-"""The light around a photograph's scene: what it shows, continued to all sides.
+"""The light around a photograph's scene: its content, continued to all sides.
 
 A photograph shows a part of its surroundings. Its columns are mirrored at its borders until they
 are all around, its topmost and bottommost rows are continued to the poles, as image-based editing

@@ -7,7 +7,7 @@ propose directions. There is no randomness.
 
 An estimate is stated only where the edges confirm it: most of their length agrees, no other frame
 has nearly as much, and it changes little if a part of the lines is left out. The edges of a table
-top may be those of a wall, too: a photograph with a ground looks down, or up a little.
+top may be parallel to a wall, too: a photograph with a ground looks down, or up a little.
 """
 
 import itertools
@@ -69,7 +69,7 @@ class Edges:
     Attributes:
         ends_px: Both ends from the middle of the image, [n, 2, 2].
         lengths_px: In an image of ``_LONG_SIDE_PX``, [n].
-        long_side_px: Of the image.
+        long_side_px: Long side of the image.
     """
 
     ends_px: Array
@@ -86,7 +86,7 @@ class Edges:
         """Sines, [m, n], between edges and the lines from their middles to vanishing points.
 
         Args:
-            directions: Of the vanishing points in the camera frame, [m, 3].
+            directions: Directions of the vanishing points in the camera frame, [m, 3].
             focal_px: Focal length.
         """
         along = self.ends_px[:, 1] - self.ends_px[:, 0]
@@ -118,7 +118,7 @@ class CameraEstimate:
 
 
 class NoHorizonError(ValueError):
-    """A photograph whose edges define no horizon; the text says why."""
+    """A photograph whose edges define no horizon; the text explains why."""
 
 
 def find_edges(rgb: UInt8) -> Edges:
@@ -315,7 +315,7 @@ class _Fit:
     """Fit of a rotation [rad], [3], and perhaps the logarithm of the focal length.
 
     Attributes:
-        axes: Of the frame at the start, rows, [3, 3].
+        axes: Axes of the frame at the start, rows, [3, 3].
         focal_px: At the start.
     """
 

@@ -22,7 +22,7 @@ from gen_data.core import asset_types, errors, safe_xml, se3
 _MAX_ELEMENTS = 1_000_000
 _UP = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}
 _LINEAR_WRITER = "Blender"
-"""Blender writes linear colours; other tools write what they show, which is sRGB."""
+"""Blender writes linear colours; other tools write displayed colours, which are sRGB."""
 
 
 def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
@@ -77,7 +77,7 @@ def _without_broken_materials(data: bytes, known: set[str]) -> bytes:
 def _placed_geometries(document: Any) -> Iterator[tuple[str, Any, Float64, dict[str, Any]]]:
     """Yield name, geometry, its affine map [3, 4] to the scene and its materials by symbol.
 
-    The name is that of the node, which tools show and descriptions refer to.
+    The name is the node's, which tools show and descriptions refer to.
     """
     if document.scene is None:
         for geometry in document.geometries:

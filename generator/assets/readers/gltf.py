@@ -33,7 +33,7 @@ from gen_data.core.errors import AssetError
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _REPEAT = 10497
 _BEYOND = 0.01
-"""Texture coordinates outside of [0, 1] by less hardly show another part of an image."""
+"""Texture coordinates outside of [0, 1] by less show almost the same part of an image."""
 _REFERENCES = (
     ("pbrMetallicRoughness", "baseColorTexture"),
     ("extensions", "KHR_materials_pbrSpecularGlossiness", "diffuseTexture"),

@@ -29,7 +29,7 @@ _APPLIED = frozenset(
         "KHR_texture_transform", "KHR_xmp_json_ld",
     }
 )  # fmt: skip
-"""Extensions that are applied, or do not change what is seen of an object."""
+"""Extensions that are applied, or do not change the look of an object."""
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Document:
     """A parsed file; buffers and embedded images are loaded on first use.
 
     Attributes:
-        remarks: What it holds and is not used, as far as its readers know by now.
+        remarks: Its unused contents, as far as its readers have found them.
     """
 
     folder: Folder
@@ -95,7 +95,7 @@ def parse_document(folder: Folder, relative: str, data: bytes) -> Document:
 def _split_chunks(data: bytes, remarks: list[str]) -> tuple[bytes, bytes]:
     _, version, length = struct.unpack_from("<4sII", data.ljust(12, b"\0"))
     if version != 2 or length > len(data):
-        raise ValueError(f"its header says version {version}, {length} of {len(data)} bytes")
+        raise ValueError(f"its header states version {version}, {length} of {len(data)} bytes")
     if length < len(data):
         remarks.append(f"{len(data) - length} bytes after its end are not read")
     chunks: dict[int, bytes] = {}
@@ -193,7 +193,7 @@ def view_bytes(document: Document, view: Mapping[str, Any]) -> bytes:
 
 
 def read_uri(document: Document, uri: str) -> bytes:
-    """Bytes of a file beside the document, or of a data URI."""
+    """Bytes of a file next to the document, or of a data URI."""
     if not uri.startswith("data:"):
         return document.folder.read(locate_file(document.folder, document.relative, unquote(uri)))
     try:

@@ -40,7 +40,7 @@ class Images:
 def gltf_material(
     description: Mapping[str, Any], images: Images
 ) -> tuple[asset_types.Material, tuple[str, ...]]:
-    """Convert a glTF material, and list what of it is not used.
+    """Convert a glTF material, and list its unused parts.
 
     Raises:
         ValueError: if a value is out of range; the message names it.
@@ -209,7 +209,7 @@ def _read_diffuse_transmission(
 ) -> tuple[float, tuple[float, float, float]]:
     """Share of the diffuse light that is transmitted, and the albedo of transmission.
 
-    Materials multiply that albedo by the image of the base colour, glTF by an image of its own: the
+    Materials multiply that albedo by the image of the base colour, glTF by a separate image: the
     albedo is scaled such that its mean is the file's.
     """
     extension = further.get("KHR_materials_diffuse_transmission", {})

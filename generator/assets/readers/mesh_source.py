@@ -28,7 +28,7 @@ class MeshSource:
         soup: Its triangles. ``Material.texture`` is an image's path relative to the folder, or a
             key of ``images``.
         images: ``{key: encoded image}`` of images inside the file itself.
-        remarks: What the file holds and the soup does not, one phrase each.
+        remarks: Contents of the file that the soup lacks, one phrase each.
         up: Axis that the file states as up, ``x``, ``y`` or ``z``; empty = it states none.
     """
 
@@ -57,11 +57,11 @@ def locate_file(folder: Folder, base: str, reference: str, remarks: list[str] | 
     """Path of a file that ``base`` refers to, as it is written where it exists.
 
     ``model://`` and ``package://`` are looked up as in descriptions of robots (``robot_files``).
-    Else a file of that name beside ``base``, or of that name in other case, is taken: files are
+    Else a file of that name next to ``base``, or of that name in other case, is taken: files are
     moved from computers with other paths, and some systems do not tell cases apart.
 
     Raises:
-        AssetError: if it is a URL, absolute or outside, and no such file is beside ``base``.
+        AssetError: if it is a URL, absolute or outside, and no such file is next to ``base``.
     """
     name = PurePosixPath(reference.replace("\\", "/")).name
     path, refusal = "", None
@@ -80,7 +80,7 @@ def locate_file(folder: Folder, base: str, reference: str, remarks: list[str] | 
 
 
 def _candidates(folder: Folder, base: str, path: str, name: str) -> Iterator[str]:
-    """Paths to try for a missing file: in other case, then beside the file that refers to it."""
+    """Paths to try for a missing file: in other case, then next to the file that refers to it."""
     beside = str(PurePosixPath(base).parent / name) if name else ""
     for wanted in dict.fromkeys((path, beside)):
         if not wanted:

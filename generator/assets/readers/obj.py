@@ -68,7 +68,7 @@ def read_obj(folder: Folder, relative: str, materials: bool) -> mesh_source.Mesh
 def decode_text(data: bytes) -> str:
     """Text of a file whose encoding is not stated, with line feeds at the ends of its lines.
 
-    It is UTF-8 or, where a byte order mark says so, UTF-16; Latin-1 if it is neither.
+    It is UTF-8 or, with such a byte order mark, UTF-16; Latin-1 if it is neither.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         text = data.decode("utf-16", errors="replace")
@@ -369,7 +369,7 @@ class _Definition:
 
 
 def _read_mtl(folder: Folder, relative: str, remarks: list[str]) -> dict[str, _Definition]:
-    """Definitions by name; what they hold and is not used is added to the remarks."""
+    """Definitions by name; their unused contents are added to the remarks."""
     definitions: dict[str, _Definition] = {}
     name = ""
     for line in decode_text(folder.read(relative)).split("\n"):
@@ -499,5 +499,5 @@ def _is_number(token: str) -> bool:
 
 
 def _drop_tint(material: asset_types.Material) -> asset_types.Material:
-    """Make a textured material white: exporters write arbitrary greys beside an image."""
+    """Make a textured material white: exporters write arbitrary greys next to an image."""
     return replace(material, base_color=(1.0, 1.0, 1.0)) if material.texture else material

@@ -310,7 +310,7 @@ def _build_soup(
     textured = uvs is not None
     colors = None if textured else _read_colors(vertex, face, corner, polygon, remarks)
     if textured and (_is_colored(_srgb(vertex)) or _is_colored(_srgb(face))):
-        remarks.append("vertex and face colours are not used beside an image")
+        remarks.append("vertex and face colours are not used next to an image")
     if images and not textured:
         remarks.append(f"the image {images[0]} is not used: there are no texture coordinates")
     plain = MaterialSlot() if colors is None else MaterialSlot(material=WHITE, from_file=True)
@@ -374,7 +374,7 @@ def _read_colors(
     by_vertex, by_face = _srgb(vertex), _srgb(face)
     if by_vertex is not None and (by_face is None or not _varies(by_face) or _varies(by_vertex)):
         if by_face is not None and _varies(by_face):
-            remarks.append("face colours are not used beside vertex colours")
+            remarks.append("face colours are not used next to vertex colours")
         return by_vertex[corner]
     return None if by_face is None else np.repeat(by_face[polygon][:, None], 3, axis=1)
 

@@ -69,7 +69,7 @@ def read_3mf(folder: Folder, relative: str, materials: bool) -> MeshSource:
     """Read the objects that a 3MF file builds.
 
     Raises:
-        AssetError: if it is no archive with a model, malformed, or larger than the limits.
+        AssetError: if it is not an archive with a model, malformed, or larger than the limits.
     """
     place = str(folder.root / relative)
     try:

@@ -41,7 +41,7 @@ class StageFile:
     """An open stage in a folder.
 
     Attributes:
-        folder: Folder of its files: the user's, or that of an unpacked archive.
+        folder: Folder of its files: the user's, or an unpacked archive.
         packed: Whether it comes from an archive.
     """
 
@@ -138,7 +138,7 @@ class StageFile:
         if not resolved.is_relative_to(root):
             raise errors.AssetError(
                 f"{self.stage.place}: refers to the image '{path[:80]}' outside its folder; put it "
-                "beside the layer"
+                "next to the layer"
             )
         return resolved.relative_to(root).as_posix()
 
@@ -166,7 +166,7 @@ def _open_composed(folder: Folder, relative: str, place: str) -> OpenStage:
     stage = OpenStage(folder.path(relative), place)
     root = folder.root.resolve()
     if not all(Path(layer).resolve().is_relative_to(root) for layer in stage.layers()):
-        raise errors.AssetError(f"{place}: uses layers outside its folder; put them beside it")
+        raise errors.AssetError(f"{place}: uses layers outside its folder; put them next to it")
     return stage
 
 

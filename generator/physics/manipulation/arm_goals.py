@@ -41,7 +41,7 @@ class Arm:
         articulation: The robot in the scene.
         robot: Its model.
         links: Links with collision geometry.
-        moving: Those of them that can move.
+        moving: Links among these that can move.
         bodies: Names of the bodies of all its links.
     """
 

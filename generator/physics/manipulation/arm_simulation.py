@@ -20,9 +20,9 @@ from gen_data.physics.world import World
 _TOUCH_M = 0.0005
 """Fingers nearer than this to a body touch it."""
 _DEPTH_M = 0.002
-"""Fixed bodies stop the arm where it, or what it holds, is this deep inside them."""
+"""Fixed bodies stop the arm where it, or the held body, is this deep inside them."""
 _PROBE = 0.05
-"""Share of their stroke by which fingers are closed to find what stops them."""
+"""Share of their stroke by which fingers are closed to find the bodies that stop them."""
 _RELEASE = 0.01
 """Fingers let go when they are told to open by this share of their stroke."""
 
@@ -73,10 +73,10 @@ class ArmSimulation:
         time_step_s: Simulated time per step of the world.
 
     Attributes:
-        positions, speeds: Of the arm joints [rad or m, and per s], shape [n].
+        positions, speeds: Positions and speeds of the arm joints [rad or m, and per s], shape [n].
         limits: Lowest and highest positions, shape [2, n].
         speeds_max: Limits of their speeds, shape [n].
-        opening: Of the gripper, in [0, 1].
+        opening: Opening of the gripper, in [0, 1].
         held: Name of the body in the hand; empty = none.
         is_blocked: Whether an obstacle stopped the arm during the latest ``advance``.
     """
@@ -130,7 +130,7 @@ class ArmSimulation:
             self._world.place(self.held, self.T_world_grasp @ self._T_grasp_held)
 
     def place(self, poses: Mapping[str, SE3]) -> None:
-        """Move bodies that follow a trajectory of their own: ``{name: T_world_body}``."""
+        """Move bodies that follow their own trajectories: ``{name: T_world_body}``."""
         for name, pose in poses.items():
             self._world.place(name, pose)
 
@@ -194,7 +194,7 @@ class ArmSimulation:
     def _sides_stopped(self, fingers: Sequence[str], name: str) -> set[bool]:
         """Sides of the grasp frame, along Y, on which a body is in the way of closing fingers.
 
-        What lies before the fingers touches them, too, but they would slide along it.
+        Bodies before the fingers touch them, too, but they would slide along these.
         """
         T_grasp_world = self.T_world_grasp.inverse()
         before = {f: (self._gap_m(f, name), self._middle_m(f)) for f in fingers}

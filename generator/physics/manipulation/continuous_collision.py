@@ -1,6 +1,6 @@
 """Continuous collision detection for the legs of an arm, by conservative advancement.
 
-Between two checks no point moves farther than the smallest measured gap, so that no contact can be
+Between two checks no point moves farther than the smallest measured gap: no contact can be
 skipped (Mirtich, Impulse-based dynamic simulation of rigid body systems, 1996, chapter 2).
 """
 
@@ -156,7 +156,7 @@ class CollisionSweep:
 
         Args:
             link: The link.
-            radius_m: Of a ball around the link's origin.
+            radius_m: Radius of a ball around the link's origin.
             changes: ``{joint: |change of position|}`` over the leg [rad or m].
         """
         return sum(

@@ -1,7 +1,8 @@
-"""Demonstrations: an arm carries out its legs in physics, which tells what becomes of the bodies.
+"""Demonstrations: an arm carries out its legs in physics, which moves the bodies that it meets.
 
-The arm and what it holds move as planned; everything else is simulated. The fingers push what they
-meet, but carry nothing by friction: a held body is attached to the hand until the fingers open.
+The arm and its held body move as planned; everything else is simulated. The fingers push bodies in
+their way, but carry nothing by friction: a held body is attached to the hand until the fingers
+open.
 While it pivots, the fingers are a hinge with friction, and contacts turn it. A suction cup holds a
 body only if it seals on it, and as long as its force is large enough.
 """
@@ -25,10 +26,10 @@ _STILL_RAD = 0.002
 _SLIP_KNOTS = 12
 """A slip happens after a body has been held for 0.6 s."""
 _PAD_FRICTION_N_M = 0.05
-"""Torque that turns a thing between two finger tips: a 100 g block held 2 cm off its centre does
+"""Torque that turns a body between two finger tips: a 100 g block held 2 cm off its centre does
 not turn by its weight (0.02 N m), and turns when its edge is pressed down with 2 N (assumed)."""
 _SETTLE_S = 0.6
-"""After the last goal, so that what was let go comes to rest, and before a recovery."""
+"""After the last goal, for released bodies to come to rest, and before a recovery."""
 _HESITATION_S = 1.0
 """An arm that recovers from being late has waited for this time."""
 _IN_HAND: tuple[scene.FailureKind, ...] = ("", "late", "wrong_object")
@@ -38,15 +39,15 @@ _IN_HAND: tuple[scene.FailureKind, ...] = ("", "late", "wrong_object")
 def demonstrate(
     planners: Sequence[manipulation_planner.TaskPlanner], world: World, time_step_s: float
 ) -> "Demonstration | errors.Rejection":
-    """Plan and carry out the task of an arm goal by goal; each plan starts from what physics left.
+    """Plan and carry out the task of an arm goal by goal; each plan starts from physics.
 
     Other arms stand still, or pursue the goals that name them. A failure that was asked for befalls
-    the first grasp, or makes the arms wait in the middle of the program. It is no reason to stop:
-    the arm goes on as if nothing had happened, or, if the assignment says that it recovers, looks
-    at what has become of everything and tries again.
+    the first grasp, or makes the arms wait in the middle of the program. It does not stop the arm,
+    which goes on as if nothing had happened, or, if the assignment recovers, looks at the state of
+    all bodies and tries again.
 
     Args:
-        planners: Of the arm with the task, then of the others that its goals name.
+        planners: Planners of the arm with the task, then of the others that its goals name.
         world: Has all bodies.
         time_step_s: Simulated time per step of the world.
 
@@ -73,7 +74,7 @@ def demonstrate(
         return errors.Rejection(
             f"task '{assignment.name}': after the demonstration, {first.measure} of "
             f"'{first.body}'{between} is {shown.value_at_end(first):.3f}",
-            f"other places of the things of task '{assignment.name}', or another task",
+            f"other places of the objects of task '{assignment.name}', or another task",
         )
     return shown
 
@@ -150,7 +151,7 @@ def _mishap(
     number: int,
     shown: "Demonstration",
 ) -> errors.Rejection | None:
-    """What precedes the first grasp: a blow, or another body in the hand, which it may put back."""
+    """Precede the first grasp: by a blow, or another body in the hand, which it may put back."""
     if assignment.failure == "collision":
         steps: list[tuple[scene.ArmGoal | None, str]] = [(None, "approach")]
     else:
@@ -172,7 +173,7 @@ def _without_approach(legs: list[Leg]) -> list[Leg]:
 
 
 class _Hand:
-    """An arm of a demonstration, and what was in its hand at every knot; empty = nothing."""
+    """An arm of a demonstration, and the body in its hand at every knot; empty = nothing."""
 
     def __init__(self, planner: manipulation_planner.TaskPlanner) -> None:
         self.arm = planner.arm
@@ -184,16 +185,16 @@ class _Hand:
         self.positions = planner.positions
 
     def stay(self, duration_s: float) -> Leg:
-        """A leg that stands still, with what is in the hand."""
+        """A leg that stands still, with the body in the hand."""
         held = self.legs[-1].held if self.legs else None
         return Leg(self.positions, self.positions, duration_s, held)
 
 
 class Demonstration:
-    """Simulates the legs of arms and records what happens, knot by knot.
+    """Simulates the legs of arms and records the motion, knot by knot.
 
     Args:
-        planners: Of its arms, the one with the task first.
+        planners: Planners of its arms, the one with the task first.
         world: Has all bodies.
         time_step_s: Simulated time per step of the world.
 
@@ -225,7 +226,7 @@ class Demonstration:
 
     @property
     def legs(self) -> list[tuple[arm_goals.Arm, list[Leg]]]:
-        """All legs carried out so far, by arm; those of all arms last equally long."""
+        """All legs carried out so far, by arm; legs of all arms last equally long."""
         return [(hand.arm, hand.legs) for hand in self._hands]
 
     def run(self, legs: Mapping[str, Sequence[Leg]], phase: str) -> None:
@@ -304,7 +305,7 @@ class Demonstration:
         return held.count(self._first_held) >= _SLIP_KNOTS and not held[-1]
 
     def recover(self, planners: Sequence[manipulation_planner.TaskPlanner]) -> scene.FailureKind:
-        """Notice the failure: wait, plan from what physics left, and let no other happen."""
+        """Notice the failure: wait, plan from the simulated state, and let no other happen."""
         self.wait(_SETTLE_S, "notice")
         for planner in planners:
             planner.look(self.poses[-1])
@@ -312,7 +313,7 @@ class Demonstration:
         return ""
 
     def episode(self, start_s: float) -> scene.Episode:
-        """What happened, and whether it is a success, at times from ``start_s`` on."""
+        """The record, and whether it is a success, at times from ``start_s`` on."""
         succeeded = not self.failed_conditions()
         return scene.Episode(
             succeeded,
@@ -389,7 +390,7 @@ class Demonstration:
         positions: Sequence[Sequence[float]],
         bodies: Sequence[str] | None = None,
     ) -> None:
-        """Record a knot; ``bodies`` are those in the hands, by default what the legs hold."""
+        """Record a knot; ``bodies`` are the bodies in the hands, by default as in the legs."""
         if bodies is None:
             bodies = [self._held_body(hand, leg) for hand, leg in moving]
         before = self.poses[-1] if self.poses else self._start

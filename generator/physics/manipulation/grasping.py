@@ -18,9 +18,9 @@ _PAD_GAP_M = 0.002
 _CUP_GAP_M = 0.0005
 """Between the rim of a cup and the object that it holds: they touch without overlapping."""
 _PLAY_M = 0.0005
-"""Between each finger and what it pulls or turns, so that rigid fingers do not jam it."""
+"""Between each finger and the body that it pulls or turns, to keep rigid fingers from jamming."""
 _CLOSING_STEPS = 16
-"""Of 5 mm, or less than a finger is thick, so that none passes through a wall between two."""
+"""Steps of 5 mm, or less than a finger is thick: none passes through a wall between two."""
 _BISECTIONS = 14
 """Halvings of the opening: a stroke of 8 cm is closed to within 5 micrometres."""
 

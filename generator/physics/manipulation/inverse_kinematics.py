@@ -36,7 +36,7 @@ class Chain:
     """The joints from a robot's base to its grasp frame; fixed joints are part of the offsets.
 
     Attributes:
-        joints: From the base on, including those that mimic an arm joint.
+        joints: From the base on, including joints that mimic an arm joint.
         offsets: Pose of each joint frame in the previous joint's child link.
         drives: Per joint: index into ``solved`` of the joint that drives it, multiplier, offset.
         T_last_grasp: Grasp frame in the last joint's child link.

@@ -167,8 +167,8 @@ class TrajectoryRecording:
         Args:
             arms: Each with its timed legs, which last equally long, and the links with a body in
                 the scene.
-            simulated: ``{name: T_world_body}`` of all movable bodies at every knot, where physics
-                tells them; without it only held bodies move.
+            simulated: ``{name: T_world_body}`` of all movable bodies at every knot, from physics;
+                without it only held bodies move.
         """
         start = self._knot
         for arm, legs, parts in arms:

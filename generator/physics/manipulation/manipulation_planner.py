@@ -44,9 +44,9 @@ _BLOWS_MAX = 8
 _BLOW_M = 0.08
 """Distance from a body at which a hand comes down to knock it away; it goes half as far beyond."""
 _PUSH_M_S = 0.15
-"""Fastest empty hand that may push things: links have no speed in physics, which moves what they
-overlap out of the way by a fifth of the overlap per step of 1/240 s. At this speed things lag
-behind by 3 mm, half the thickness of a thin finger."""
+"""Fastest empty hand that may push bodies: links have no speed in physics, which moves overlapped
+bodies out of the way by a fifth of the overlap per step of 1/240 s. At this speed bodies lag behind
+by 3 mm, half the thickness of a thin finger."""
 _HALF_TURN = SE3(quaternion_wxyz=(0.0, 0.0, 0.0, 1.0))
 """The same grasp with the fingers exchanged."""
 _FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
@@ -65,7 +65,7 @@ class TaskPlanner:
 
     Attributes:
         arm: The robot.
-        positions: Of all joints after the legs planned so far.
+        positions: Positions of all joints after the legs planned so far.
         resting: Poses of bodies after the legs planned so far, without the held one.
     """
 
@@ -124,7 +124,7 @@ class TaskPlanner:
         return [self._arm.grasp_pose(p).translation_m for p in (leg.start, *leg.via, leg.end)]
 
     def observe(self, poses: Mapping[str, SE3]) -> None:
-        """Plan from here on with the poses of bodies that physics tells, ``T_world_body``."""
+        """Plan from here on with the poses of bodies from physics, ``T_world_body``."""
         self.resting.update({name: pose for name, pose in poses.items() if name in self.resting})
         if self._held is not None:
             T_grasp_world = self._arm.grasp_pose(self.positions).inverse()
@@ -132,7 +132,7 @@ class TaskPlanner:
             self._held = replace(self._held, T_grasp_held=moved)
 
     def look(self, poses: Mapping[str, SE3]) -> None:
-        """Plan from here on with all poses that physics tells, and with an empty hand."""
+        """Plan from here on with all poses from physics, and with an empty hand."""
         if self._held is not None:
             self.resting[self._held.body] = poses[self._held.body]
             self._held = None
@@ -150,7 +150,7 @@ class TaskPlanner:
     def plan_blow(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         """Timed legs of a closed hand that knock away the first object of a grasp.
 
-        They come down beside it, pass through its place and rise; of several directions the first
+        They come down next to it, pass through its place and rise; of several directions the first
         possible one is taken. The object keeps its place in ``resting``.
         """
         start, refused = self.positions, self._reject([], CANNOT_REACH, number)
@@ -227,7 +227,7 @@ class TaskPlanner:
             yield from found[:_CONFIGURATIONS_MAX]
 
     def _hand_pose(self, goal: scene.ArmGoal, pose: SE3) -> SE3:
-        """``T_world_grasp`` for a pose of a goal, which may be that of the held object."""
+        """``T_world_grasp`` for a pose of a goal, which may be a pose of the held object."""
         if not goal.carries or self._held is None:
             return pose
         return pose @ self._held.T_surface_rest @ self._held.T_grasp_held.inverse()
@@ -262,7 +262,7 @@ class TaskPlanner:
         return [leg]
 
     def _plan_grip(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
-        """A leg of the fingers; what they hold rests from then on where it is, or is held."""
+        """A leg of the fingers; their object rests from then on where it is, or is held."""
         opening, taken = goal.gripper_opening, goal.objects[0] if goal.carries else ""
         if goal.objects and self._hand is not None:
             T_world_grasp = self._arm.grasp_pose(self.positions)
@@ -399,7 +399,7 @@ class TaskPlanner:
     ) -> Iterator[tuple[SE3, Positions, Positions]]:
         """Stable poses of the held body with configurations at and above them.
 
-        Candidates are examined in batches, so that early ones are preferred; least effort comes
+        Candidates are examined in batches, which prefers early ones; least effort comes
         first within a batch.
         """
         for first in range(0, len(candidates), _SPOTS_PER_BATCH):

@@ -14,7 +14,7 @@ GAP_MAX_M = 0.1
 
 
 class Measures:
-    """What ``Condition`` measures, in a world.
+    """Measurements of ``Condition``, in a world.
 
     Args:
         world: Has all bodies that conditions name.

@@ -84,8 +84,8 @@ class MotionPlanner:
     def follow(self, poses: Sequence[SE3], start: Positions) -> list[Positions] | None:
         """Positions along straight lines of the hand from a start through poses; None if it cannot.
 
-        The hand turns evenly on the way. Positions are those of ``nearest_configuration``, close
-        enough to each other that straight lines in joint space stay near those of the hand.
+        The hand turns evenly on the way. Positions come from ``nearest_configuration``, close
+        enough to each other that straight lines in joint space stay near the lines of the hand.
         """
         positions, way = start, []
         for pose in poses:
@@ -167,7 +167,7 @@ class MotionPlanner:
         return positions
 
     def _arm_positions(self, positions: Sequence[float]) -> list[float]:
-        """Positions of the arm joints among those of all movable joints."""
+        """Positions of the arm joints out of the positions of all movable joints."""
         return [p for p, is_arm in zip(positions, self._is_arm, strict=True) if is_arm]
 
 

@@ -1,8 +1,8 @@
-"""Suction: where a vacuum cup seals on a body, and what it carries.
+"""Suction: where a vacuum cup seals on a body, and the load that it carries.
 
 A cup seals where its whole rim lies on the body: rays from points of the rim along the cup's axis
 measure distance and slope of the surface below it. A gap anywhere lets air in. Mahler et al.,
-Dex-Net 3.0 (2018), section IV, likewise require contact at every vertex of the rim.
+Dex-Net 3.0 (2018), section IV, also require contact at every vertex of the rim.
 """
 
 import math
@@ -20,7 +20,7 @@ TILT_MAX_RAD = math.radians(5.0)
 """Largest angle between the cup's axis and the normal of the surface (assumed)."""
 _RIM_POINTS = 12
 _PROBE_M = 0.01
-"""Rays begin this far behind the rim, so that they also meet what is in front of it."""
+"""Rays begin this far behind the rim, to meet surfaces in front of it, too."""
 _NORMAL = np.array([0.0, 0.0, 1.0])
 
 

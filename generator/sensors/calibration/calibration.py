@@ -19,7 +19,7 @@ class CalibratedCamera:
     """Intrinsics of one camera as its file has them.
 
     Attributes:
-        position: Of its numbers in the file.
+        position: Position of its numbers in the file.
         focal_px, center_px: fx, fy and cx, cy.
         coefficients: All of ``COEFFICIENTS[model]``, in that order.
         size_px: Size of the calibrated images; None = the file does not state it.
@@ -83,8 +83,8 @@ class Calibration:
         """``T_rig_sensor`` of a frame, both X forward, Y left, Z up.
 
         Args:
-            frame: Its name; empty = the only one that is no root.
-            relative_to: Name of the frame that is the rig's; empty = the root above ``frame``.
+            frame: Its name; empty = the only one that is not a root.
+            relative_to: Name of the frame of the rig; empty = the root above ``frame``.
             optical: Axes of ``frame``; None = as the format has them.
 
         Raises:
@@ -136,7 +136,7 @@ def numbers(node: Node, count: Sequence[int], name: str) -> list[float]:
     Args:
         node: The list or matrix.
         count: Allowed lengths.
-        name: Of the entry, in messages.
+        name: Name of the entry, in messages.
 
     Raises:
         ConfigError: it is not such a list.
@@ -165,7 +165,7 @@ def camera_matrix(node: Node, name: str, columns: int = 3) -> tuple[float, float
     """Fx, fy, cx and cy of a calibration matrix [3, columns].
 
     Raises:
-        ConfigError: it is no matrix of a camera without skew.
+        ConfigError: it is not the matrix of a camera without skew.
     """
     K = np.array(numbers(node, [3 * columns], name)).reshape(3, columns)
     if min(K[0, 0], K[1, 1]) <= 0.0:
@@ -179,7 +179,7 @@ def rigid(values: Sequence[float], node: Node, name: str) -> se3.SE3:
     """Pose of 12 or 16 numbers, the rows of a matrix.
 
     Raises:
-        ConfigError: its first three columns are no rotation.
+        ConfigError: its first three columns are not a rotation.
     """
     matrix = np.array(values).reshape(-1, 4)
     check_rotation(matrix[:3, :3], node, name)
@@ -189,4 +189,4 @@ def rigid(values: Sequence[float], node: Node, name: str) -> se3.SE3:
 def check_rotation(R: se3.Array, node: Node, name: str) -> None:
     """Raise ConfigError unless a matrix [3, 3] is a rotation, to a few digits."""
     if np.abs(R @ R.T - np.eye(3)).max() > ROTATION_ERROR_MAX or np.linalg.det(R) < 0.0:
-        fail(node, name, "is no rotation: its rows are not orthonormal and right-handed")
+        fail(node, name, "is not a rotation: its rows are not orthonormal and right-handed")

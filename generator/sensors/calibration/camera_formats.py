@@ -104,7 +104,7 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
 
     Args:
         root: The mapping in the file.
-        fisheye: Whether OpenCV's four coefficients are those of its fisheye model.
+        fisheye: Whether OpenCV's four coefficients belong to its fisheye model.
         rectified: Whether to take the pinholes of projection matrices, behind which distortion and
             rotation are removed; their frames then have one origin, ``rectified``.
 
@@ -151,7 +151,7 @@ def _read_camera(
     name = stated.text if stated else ""
     if stated is not None and name not in _MODELS:
         known = ", ".join(key for key in _MODELS if key)
-        fact = f"'{name}' is no lens here; expected one of {known}{did_you_mean(name, _MODELS)}"
+        fact = f"'{name}' is not a known lens; expected one of {known}{did_you_mean(name, _MODELS)}"
         fail(stated, "distortion_model", fact)
     model = "kannala_brandt" if fisheye else _MODELS[name]
     lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
@@ -204,7 +204,7 @@ def _size_px(entries: _Entries) -> tuple[int, int] | None:
 
 
 def _pair_frames(entries: _Entries) -> dict[str, Frame]:
-    """Frames of ``stereoCalibrate``: points of camera 2 are ``R`` times those of 1, plus ``T``."""
+    """Frames of ``stereoCalibrate``: ``R``, ``T`` map points of camera 1 to camera 2."""
     R, T = entries.take(("R", "rotation")), entries.take(("T", "translation"))
     if R is None or T is None:
         return {}

@@ -2,7 +2,7 @@
 
 * ROS: ``TransformStamped`` in YAML, as ``ros2 topic echo /tf_static`` prints it, and URDF. By REP
   103, frames whose names end with ``_optical`` or ``_optical_frame`` have Z forward, others X.
-* nuScenes: ``calibrated_sensor.json`` beside ``sensor.json``; frames are channels, the root is the
+* nuScenes: ``calibrated_sensor.json`` next to ``sensor.json``; frames are channels, the root is the
   ego vehicle's: on the ground below the middle of the rear axle. Cameras have Z forward; the
   laser scanner has Y forward.
 * KITTI: ``calib/000000.txt`` of the benchmarks and ``calib_*.txt`` of raw data. Frames are
@@ -62,7 +62,7 @@ def tf_frames(root: Node) -> calibration.Calibration:
         q = np.array([values[f"{key}4"] for key in "wxyz"])
         if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
             calibration.fail(
-                turn, "rotation", f"is no unit quaternion, its length is {np.linalg.norm(q):g}"
+                turn, "rotation", f"is not a unit quaternion, its length is {np.linalg.norm(q):g}"
             )
         w, x, y, z = (float(v) for v in q / np.linalg.norm(q))
         name, above = child.text.strip("/"), parent.text.strip("/")
@@ -133,7 +133,9 @@ def nuscenes_frames(records: Any, path: Path) -> calibration.Calibration:
         fact = f"needs the names of channels in {table}: {error.strerror}"
         raise ConfigError(f"{path}: {fact}") from None
     except (KeyError, TypeError, ValueError) as error:
-        raise ConfigError(f"{path}: is no calibrated_sensor.json of nuScenes ({error})") from None
+        raise ConfigError(
+            f"{path}: is not a calibrated_sensor.json of nuScenes ({error})"
+        ) from None
     return calibration.Calibration(str(path), "calibrated sensors of nuScenes", cameras, frames)
 
 
@@ -142,7 +144,7 @@ def _nuscenes_frame(record: Mapping[str, Any], modality: str, path: Path) -> cal
     tx, ty, tz = (float(v) for v in record["translation"])
     norm = math.sqrt(w * w + x * x + y * y + z * z)
     if abs(norm - 1.0) > 1e-3:
-        raise ConfigError(f"{path}: the rotation of {record['token']} is no unit quaternion")
+        raise ConfigError(f"{path}: the rotation of {record['token']} is not a unit quaternion")
     pose = SE3((tx, ty, tz), (w / norm, x / norm, y / norm, z / norm))
     # The scanner's frame is X right, Y forward; a sensor here has X forward.
     ahead = SE3.about_z(0.5 * math.pi) if modality == "lidar" else SE3()
@@ -159,7 +161,7 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> calib
     """One file of KITTI's calibration: cameras, and frames as far as the file has them.
 
     The benchmarks' files have rectified cameras. Of raw data, ``calib_cam_to_cam.txt`` has both:
-    ``rectified`` selects those of ``P_rect``.
+    ``rectified`` selects the cameras of ``P_rect``.
 
     Raises:
         ConfigError: a line is malformed, or the file has nothing of it.

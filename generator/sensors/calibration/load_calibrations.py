@@ -33,7 +33,8 @@ def load_calibrations(sensor: Node, field: str) -> Node:
     ``field`` is the path of the sensor in messages: ``sensors[0]``.
 
     Raises:
-        ConfigError: a file cannot be read, has another layout, or what has no counterpart here.
+        ConfigError: a file cannot be read, has another layout, or describes a sensor without
+            counterpart here.
     """
     if not isinstance(sensor.content, Mapping):
         return sensor

@@ -23,7 +23,7 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
 
     Args:
         path: The file.
-        fisheye: Whether four coefficients of OpenCV are those of its fisheye model.
+        fisheye: Whether four coefficients of OpenCV belong to its fisheye model.
         rectified: Whether to take rectified pinholes, from projection matrices.
 
     Raises:
@@ -37,7 +37,7 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
         try:
             return frame_formats.nuscenes_frames(json.loads(text), path)
         except ValueError as error:
-            raise errors.ConfigError(f"{path}: is no valid JSON ({error})") from None
+            raise errors.ConfigError(f"{path}: is not valid JSON ({error})") from None
     if path.suffix.lower() == ".txt":
         if _KITTI.search(text):
             return frame_formats.kitti_calibration(text, file, rectified=rectified)
@@ -65,7 +65,7 @@ def _text(path: Path) -> str:
 
 
 def _plain_yaml(text: str) -> str:
-    """YAML without what only OpenCV and ROS write: ``%YAML:1.0``, tags, an empty last document.
+    """YAML without the syntax of OpenCV and ROS: ``%YAML:1.0``, tags, an empty last document.
 
     Lines and columns stay.
     """

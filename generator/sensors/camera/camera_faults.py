@@ -136,7 +136,7 @@ class DrawnCameraFaults:
         return replace(reading, channels=channels, faults=self.record())
 
     def record(self) -> Mapping[str, Any]:
-        """The faults as plain data, without those that are none."""
+        """The present faults as plain data."""
         height = self.shape[0]
         record = {
             "dead_pixels": self.pixels.tolist(),

@@ -37,7 +37,7 @@ def denoise(image: Float32, white_e: float, read_noise_e: float, strength: float
         image: Values of any range.
         white_e: Electrons of a white pixel.
         read_noise_e: Standard deviation of the read noise [electrons].
-        strength: 1 averages what differs by no more than noise.
+        strength: 1 averages pixels that differ by no more than noise.
     """
     stable = _stabilize(image, white_e, read_noise_e)
     luma = cv2.transform(stable, REC709_LUMINANCE[None])

@@ -15,11 +15,11 @@ from gen_data.core.se3 import Array
 from gen_data.core.shutter import Shutter
 
 EV100_RANGE = (1.0, 17.0)
-"""Of a camera without limits of its own: from 1/30 s at f/1.4 and ISO 3200 to sunlit snow.
+"""Limits of a camera that states none: from 1/30 s at f/1.4 and ISO 3200 to sunlit snow.
 
-Automatic exposure stops there, so that night scenes stay dark."""
+Automatic exposure stops there, which keeps night scenes dark."""
 EV100_DARKEST = -6.0
-"""Of a landscape under a clear sky without the moon: the darkest that a meter tells apart."""
+"""Landscape under a clear sky without the moon: the darkest value that a meter distinguishes."""
 _METERED_EVERY = 4
 _DIM_EV100 = 5.0
 """Of a home by lamplight."""
@@ -31,7 +31,7 @@ class ExposureControl(Strict):
     """Limits of exposure control: the time is lengthened first, then the gain raised.
 
     Attributes:
-        f_number: Of the aperture.
+        f_number: F-number of the aperture.
         time_s: Shortest and longest exposure time.
         iso: Base and highest ISO speed.
     """
@@ -106,13 +106,14 @@ def meter_mean_ev100(
     clipped: float = 1.0,
     limits_ev100: tuple[float, float] = EV100_RANGE,
 ) -> float:
-    """The lowest exposure value at which the image is no brighter than this mean.
+    """The lowest exposure value at which the image's mean does not exceed this one.
 
-    What saturates counts as 1.
+    Saturated pixels count as 1.
 
     Automatic exposure of machine vision cameras: "to achieve a specific average image intensity"
     of the whole image (Point Grey, Flea3 FL3-U3 Technical Reference, section 7.10). Bright surfaces
-    lower the exposure until they saturate, dark ones hardly count; a log-average does the opposite.
+    lower the exposure until they saturate, dark ones have little weight; a log-average does the
+    opposite.
 
     Args:
         radiance: Linear RGB [cd/m^2], shape [h, w, 3].
@@ -141,7 +142,7 @@ def dimming_ev(ev100: float) -> float:
     The key, the brightness at which a picture shows a scene, is ``1.03 - 2 / (2 + log10(L + 1))``
     of the scene's luminance L [cd/m^2] (Krawczyk, Myszkowski and Seidel, "Perceptual effects in
     real-time tone mapping", SCCG 2005, compared with other implementations); it counts relative to
-    that of a home by lamplight.
+    a home by lamplight.
     """
     dim, here = (_key(MIDDLE_GREY * saturation_cd_m2(ev)) for ev in (_DIM_EV100, ev100))
     return max(0.0, round(math.log2(dim / here) * _EV100_STEPS) / _EV100_STEPS)

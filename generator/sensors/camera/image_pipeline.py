@@ -79,26 +79,27 @@ class ImagePipeline(base_model.Strict):
     Attributes:
         preset: A camera of ``generator/sensors/camera/presets``, which provides defaults for all
             other keys; ``ideal`` has an exposure and a tone curve, and no errors.
-        reduction: Width of the camera's photograph over that of the image: above 1, the image is
+        reduction: Width of the camera's photograph over the width of the image: above 1, the image
+            is
             reduced from a larger photograph. Pixels, photosites and lengths in pixels of all other
-            keys are those of the photograph; each pixel of the image is the mean of
-            ``reduction`` squared of them, after each has its own tone.
+            keys refer to the photograph; each pixel of the image is the mean of ``reduction``
+            squared pixels of the photograph, after each has its tone.
         focus: Depth of field; null = everything is sharp.
         shake_px: Length of the path that the image moves along while the shutter is open, as in a
             hand; straight, in a drawn direction.
         flare: Share of the light far beyond white that returns as ghosts.
         glare: Share of all light that the lens scatters around its source; 0.02 suits a clean
             lens, 0.1 a dirty one.
-        blur_px: Standard deviation of the lens's point spread function, with that of the filter
-            before the sensor: 0.4 to 0.7 for most cameras. Without it, thin lines are coloured by
-            demosaicing.
+        blur_px: Standard deviation of the point spread function of the lens together with the
+            filter before the sensor: 0.4 to 0.7 for most cameras. Without it, thin lines are
+            coloured by demosaicing.
         chromatic_aberration_px: Shift of red and blue against green at the corners.
         natural_vignetting: Whether illumination falls with the angle to the axis: with the fourth
             power of its cosine, for fisheyes as ``fisheye_pupil`` defines.
         fisheye_pupil: Power of the cosine of a fisheye's pupil: 0 turns to the light, 1 is flat.
         vignetting: Share of the light that the barrel blocks at the corners.
         metered_mean: Mean of the linear image that automatic exposure sets, as a share of
-            saturation, where what saturates counts as 1; null = the log-average luminance becomes
+            saturation, where saturated pixels count as 1; null = the log-average luminance becomes
             middle grey.
         metered_clip: Largest share of the image that automatic exposure with a ``metered_mean``
             lets saturate; 1 = any.
@@ -116,16 +117,16 @@ class ImagePipeline(base_model.Strict):
         white_balance_tint_ev: Largest difference of the estimate from the colours of lamps and
             daylight, between green and magenta, in stops; null = any estimate.
         warmth_ev: Error of the white balance: red over blue, in stops.
-        denoise: Strength of noise reduction, where noise is visible: 1 averages what differs by no
-            more than noise, 0.5 to 0.9 leaves some grain.
+        denoise: Strength of noise reduction, where noise is visible: 1 averages pixels that differ
+            by no more than noise, 0.5 to 0.9 leaves some grain.
         demosaic: Method of demosaicing: ``edge_aware`` as in good cameras, ``bilinear`` as in cheap
             ones, with coloured edges.
         saturation: Factor on saturation.
         contrast: Slope of the tone at middle grey on logarithmic axes: 1 adds none, 1.3 suits
             most cameras.
         tone: Tone curve, see ``generator/sensors/camera/isp.py``; ``log`` is for sensors with
-            several exposures, and so is ``local``, which shows what is dark and what is bright as
-            if each had an exposure of its own, as phones do.
+            several exposures, and so is ``local``, which shows dark and bright areas as if each had
+            a separate exposure, as phones do.
         sharpening: Amount of unsharp masking.
         sharpening_px: Radius of unsharp masking.
         jpeg_quality: Quality of compression, 1 to 100; null = none.
@@ -176,8 +177,8 @@ class ImagePipeline(base_model.Strict):
     def _keeps_grey(self) -> "ImagePipeline":
         for row in self.color_matrix or ():
             if abs(sum(row) - 1.0) > 1e-6:
-                raise ValueError(f"color_matrix: a row sums to {sum(row):g}; expected 1, so that"
-                                 " grey stays grey")  # fmt: skip
+                raise ValueError(f"color_matrix: a row sums to {sum(row):g}; expected 1, to keep"
+                                 " grey pixels grey")  # fmt: skip
         return self
 
     @property
@@ -199,7 +200,7 @@ class Shot:
         depth_m: [h, w], along the optical axis for pinholes, else along the ray; inf = nothing.
             None if no stage needs it.
         ev100: Exposure value that was set or metered, without compensation and errors.
-        exposure: Of the shot, with both.
+        exposure: Exposure of the shot, with both.
         rng: Draws parameters, which are the same at all steps of a sequence.
         noise_rng: Draws the noise of the sensor.
     """
@@ -358,7 +359,7 @@ def _meter(radiance: Float32, pipeline: ImagePipeline, limits_ev100: tuple[float
 
 
 def _draw(pipeline: ImagePipeline, field: str, rng: streams.Rng) -> float:
-    """Draw a setting. Raises SampleError if it is no finite number, as of a faulty plug-in."""
+    """Draw a setting. Raises SampleError if it is not a finite number, as of a faulty plug-in."""
     drawn: float = getattr(pipeline, field).draw(rng)
     if not math.isfinite(drawn):
         raise errors.SampleError(f"image_pipeline.{field}: drew {drawn}; expected a finite number")
@@ -583,7 +584,7 @@ def _preset(name: str) -> dict[str, Any]:
 
 
 def _merge_presets(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge values over those of a preset; sub-models are merged key by key."""
+    """Merge values over a preset's values; sub-models are merged key by key."""
     merged = dict(below)
     for key, value in above.items():
         under = merged.get(key)

@@ -1,6 +1,6 @@
 """Image sensor: digital numbers from light, with photon, pixel and read noise.
 
-The model is that of EMVA standard 1288: electrons are Poisson around light times response plus dark
+The model follows EMVA standard 1288: electrons are Poisson around light times response plus dark
 current times time; a gain, read noise and a converter of so many bits follow.
 """
 

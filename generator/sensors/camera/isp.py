@@ -66,8 +66,8 @@ def estimate_illuminant(image: Float32, norm: float) -> Array:
 
     It is the Minkowski norm of each channel: 1 is the mean (grey world; Buchsbaum, "A spatial
     processor model for object colour perception", 1980), infinity the largest value (white patch);
-    6 estimated best (Finlayson and Trezzi, "Shades of gray and colour constancy", 2004). Clipped
-    pixels, at 1, are left out; the light is white if hardly any other is left.
+    6 estimated best (Finlayson and Trezzi, "Shades of gray and colour constancy", 2004). Pixels
+    with a channel at 0 or from 0.95 are left out; the light is white if fewer than 16 remain.
     """
     # Channel by channel: numpy is slow on reductions over three neighbours.
     seen = np.ascontiguousarray(image.reshape(-1, 3)[::7].T)

@@ -90,7 +90,7 @@ class CalibratedLens(base_model.Strict):
             cam0; empty = the only one.
         file: Name of a file of OpenCV (YAML, XML, JSON), ROS (camera_info), Kalibr (camera chain),
             COLMAP (cameras.txt), nuScenes (calibrated_sensor.json) or KITTI.
-        fisheye: Whether the four coefficients of an OpenCV file are those of its fisheye model.
+        fisheye: Whether the four coefficients of an OpenCV file belong to its fisheye model.
         rectified: Whether to take the rectified pinhole: the projection matrix of the file.
     """
 

@@ -1,7 +1,7 @@
 """Local tone mapping: exposure fusion of a bright and a dark version of one photograph.
 
-Phones show rooms and what their windows look out on in one picture: pixels are taken from the
-version in which they are well exposed, scale by scale, so that local contrast stays (Mertens,
+Phones show rooms and the view from their windows in one picture: pixels are taken from the version
+in which they are well exposed, scale by scale, which keeps local contrast (Mertens,
 Kautz and Van Reeth, "Exposure fusion", 2007; with synthetic exposures of a merged burst: Hasinoff
 et al., "Burst photography for high dynamic range and low-light imaging on mobile cameras", SIGGRAPH
 Asia 2016, section 6). Curves are read from tables, and pyramids use only sums and products, which
@@ -25,7 +25,7 @@ _FULL = 0.8
 """Level up to which the bright version counts alone."""
 _PALE = 0.15
 """Share of the largest value from which colours become pale: one channel after the other saturates
-there, and processors hide what their ratio would be (assumed)."""
+there, and processors hide the resulting change of hue (assumed)."""
 _LEVELS = 4
 _STEPS = 4095
 
@@ -74,8 +74,8 @@ def _to_steps(display: Float32) -> np.ndarray[tuple[int, ...], np.dtype[np.int16
 def _well_exposed(level: Float32, white: float) -> Float32:
     """Share of the bright version for levels of which 1 saturates one exposure.
 
-    The dark version takes over between there and where it saturates itself: no sooner, so that a
-    lit wall stays brighter than one in shade.
+    The dark version takes over between there and its own saturation: no sooner, to keep a lit wall
+    brighter than one in shade.
     """
     last = 0.8 * math.sqrt(white)
     over = np.clip((level - np.float32(_FULL)) * np.float32(1.0 / (last - _FULL)), 0.0, 1.0)

@@ -2,7 +2,7 @@
 
 Flare consists of ghosts by reflections between the surfaces of a lens; by veiling glare, the lens
 scatters a share of all light around its source. Image pyramids use only sums and products, which
-all processors round alike, so that results do not depend on the machine.
+all processors round alike: results do not depend on the machine.
 """
 
 import math
@@ -35,8 +35,8 @@ def blur_radius_px(
 def defocus(image: Float32, radius_px: Float32) -> Float32:
     """Blur every point of an image over its circle of confusion.
 
-    Layers of similar radius are blurred and composited from far to near, so that sharp foreground
-    does not bleed into blurred background. After Kraus and Strengert, "Depth-of-field rendering by
+    Layers of similar radius are blurred and composited from far to near: sharp foreground does not
+    bleed into blurred background. After Kraus and Strengert, "Depth-of-field rendering by
     pyramidal image processing", Eurographics 2007.
     """
     levels = np.asarray(_BLUR_LEVELS, np.float32)
@@ -76,7 +76,7 @@ def _blurred_layer(image: Float32, own: NDArray[np.bool_], radius_px: float) -> 
 
 
 def _lay_over(below: Float32, layer: Float32) -> None:
-    """Lay a layer [h, w, 4] over what is below it, in place."""
+    """Composite a layer [h, w, 4] over the image below it, in place."""
     clear = np.float32(1.0) - layer[..., 3]
     # Merged first, as in scale_pixels.
     below *= cv2.merge([clear, clear, clear, clear])
@@ -188,7 +188,7 @@ def _disc(radius_px: float) -> Float32:
 def smear(image: Float32, length_px: float, angle_rad: float) -> Float32:
     """Average an image over a straight path, as of a camera that turns during the exposure.
 
-    Light beyond white keeps its energy, so that bright edges grow as they do in photographs.
+    Light beyond white keeps its energy: bright edges grow as they do in photographs.
     """
     count = max(2, math.ceil(2.0 * length_px))
     way = (np.arange(count) + 0.5) / count - 0.5

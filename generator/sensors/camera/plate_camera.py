@@ -25,7 +25,7 @@ class PlateCamera(rgb_camera.RgbCamera):
         ev100: Exposure value at ISO 100; at 12 the photograph keeps its brightness. null = metered.
         image_pipeline: From radiance to photographs. With the preset ``photograph`` the tones of
             the photograph stay as they are; noise, blur and compression that are set apply to it
-            and to what is inserted alike. Presets of cameras develop it a second time.
+            and to inserted objects alike. Presets of cameras develop it a second time.
     """
 
     type: Literal["plate_camera"] = "plate_camera"  # type: ignore[assignment]

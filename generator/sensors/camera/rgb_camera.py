@@ -77,7 +77,7 @@ class RgbCamera(Mounted):
         stereo_with: For the channels ``disparity`` and ``disparity_visible``: name of the camera
             to its right that forms a rectified pair with it.
         settings_of: Name of the camera whose drawn settings of the image pipeline it shares, as
-            the cameras of one rig do; each meters its own image. Empty = settings of its own.
+            the cameras of one rig do; each meters its own image. Empty = separate settings.
         faults: Dead pixels and lines, dirt, overexposed pictures; null = none.
     """
 
@@ -206,9 +206,9 @@ class RgbCamera(Mounted):
             scale = left.intrinsics.fx_px * baseline_m(left, right)
         except ValueError as error:
             raise errors.SampleError(
-                f"sensors '{left.name}' and '{right.name}' are no rectified pair: {error}; mount"
-                " them on one rig with the same size, field of view, lens and angles, the right one"
-                " beside the left, and vary neither alone by a randomizer"
+                f"sensors '{left.name}' and '{right.name}' are not a rectified pair: {error};"
+                " mount them on one rig with the same size, field of view, lens and angles, the"
+                " second straight to the right of the first, and vary neither alone by a randomizer"
             ) from error
         other = renderer.render(scene, right, frozenset({Channel.Z_DEPTH}))
         left_px = disparity_px(reading.channels[Channel.Z_DEPTH], scale)

@@ -1,4 +1,4 @@
-"""Files of photographs: lossless PNG, or smaller ones with a loss that viewers hardly see."""
+"""Files of photographs: lossless PNG, or smaller ones with a loss that viewers rarely notice."""
 
 from typing import Literal
 
@@ -15,7 +15,7 @@ class RgbEncoding(Strict):
 
     Attributes:
         format: png, jpeg, webp, or webp_lossless.
-        quality: Of jpeg and webp, from 1 to 100.
+        quality: Quality of jpeg and webp, from 1 to 100.
     """
 
     format: Literal["png", "jpeg", "webp", "webp_lossless"] = "png"

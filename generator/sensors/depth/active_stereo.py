@@ -47,7 +47,7 @@ class ActiveStereo(Strict):
         speckle_px: Smaller patches of disparity are removed; 0 = none.
         steps_per_px: Steps of disparity per pixel.
         full_well: Electrons of a white pixel.
-        read_noise: Of a pixel [electrons].
+        read_noise: Read noise of a pixel [electrons].
     """
 
     kind: Literal["active_stereo"]

@@ -1,4 +1,4 @@
-"""Depth camera: its data sheet; measured depth and infrared images, beside the true ones."""
+"""Depth camera: its data sheet; measured depth and infrared images, besides the true ones."""
 
 import math
 from dataclasses import replace
@@ -81,7 +81,7 @@ DepthImage = Literal[
 
 
 class DepthCamera(Mounted):
-    """A depth camera; randomizers vary its pose as that of any camera.
+    """A depth camera; randomizers vary its pose like any camera's.
 
     ``measured_depth`` is the device's output; ``depth`` and all labels are ground truth.
 

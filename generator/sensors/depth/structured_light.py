@@ -3,7 +3,7 @@
 * **Shadow**: surfaces occluded from the projector have no dots.
 * **Noise**: Nguyen, Izadi and Lovell, "Modeling Kinect Sensor Noise for Improved 3D Reconstruction
   and Tracking", 3DIMPVT 2012, axial and lateral, by distance and angle. They measured the device's
-  output, so the variance of quantisation is subtracted from that of the axial noise.
+  output, so the variance of quantisation is subtracted from the variance of axial noise.
 * **Quantisation**: disparities are whole multiples of 1/8 px (Khoshelham and Oude Elberink,
   "Accuracy and Resolution of Kinect Depth Data for Indoor Mapping Applications", Sensors 2012).
 * **Lost edges and thin objects**: dots are recognised by a window of 9 x 9 px (ibid.), a large part
@@ -201,7 +201,7 @@ def lateral_noise_px(angle_rad: Float32) -> Float32:
 def _displace(
     shape: tuple[int, int], along_px: Float32, rng: Rng
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of the pixels whose dots each pixel measures instead of its own."""
+    """Rows and columns of the pixels whose dots each pixel measures in place of its dot."""
     down_px = smooth_noise(rng, shape, NOISE_PX) * np.abs(along_px).mean()
     rows, columns = np.indices(shape)
     return (

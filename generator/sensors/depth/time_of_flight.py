@@ -1,11 +1,12 @@
 """Continuous-wave time of flight, as in the second Kinect: depth from the phase of modulated light.
 
-* **Phase**: four samples a quarter period apart; their noise is that of the electrons they count
+* **Phase**: four samples a quarter period apart, with the noise of the electrons they count
   (Lange and Seitz, "Solid-state time-of-flight range camera", IEEE JQE 2001):
   ``sigma = L / (2 pi) * sqrt(samples' variance / 2) / amplitude``, L the unambiguous range.
 * **Flying pixels**: surfaces in a pixel's footprint add up as phasors.
 * **Wrap-around**: distances are ambiguous modulo ``c / (2 f)``; several frequencies extend this to
-  that of their greatest common divisor, by the wrap count on which they agree best (as in Jaremo
+  the range of their greatest common divisor, by the wrap count on which they agree best (as in
+  Jaremo
   Lawin et al., "Efficient multi-frequency phase unwrapping using kernel density estimation", ECCV
   2016, without their spatial propagation). Disagreement leaves a hole.
 * **Multi-path**: light by way of nearby surfaces, added as one low-passed bounce, after Fuchs,

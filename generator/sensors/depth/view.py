@@ -1,4 +1,4 @@
-"""Views of a scene by a depth camera: from its own position and from beside it."""
+"""Views of a scene by a depth camera: from its position and from a position next to it."""
 
 from dataclasses import dataclass, replace
 
@@ -16,7 +16,7 @@ class Measured:
 
     Attributes:
         z_m: Measured depth along the optical axis, float32 [h, w]; inf = a hole.
-        infrared: Infrared image of its own light, uint16 [h, w].
+        infrared: Infrared image under the device's own light, uint16 [h, w].
     """
 
     z_m: asset_types.Float32
@@ -31,7 +31,7 @@ class Hits:
         range_m: Along the ray; inf = no hit.
         z_m: Along the optical axis; inf.
         reflectance: As in ``LidarHits``: infrared, including incidence; 0.
-        cosine: Of the angle of incidence; 0.
+        cosine: Cosine of the angle of incidence; 0.
     """
 
     range_m: asset_types.Float32
@@ -75,7 +75,7 @@ class View:
         return Hits(*(np.asarray(image, np.float32).reshape(shape3) for image in images))
 
     def z_depth_m(self, right_m: float) -> asset_types.Float32:
-        """Depth image from beside the camera, float32 [h, w]; inf = nothing."""
+        """Depth image from a position to the right of the camera, float32 [h, w]; inf = nothing."""
         return self._render(right_m, capture.Channel.Z_DEPTH)
 
     def luminance_cd_m2(self, right_m: float) -> asset_types.Float32:

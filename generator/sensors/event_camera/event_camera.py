@@ -2,11 +2,11 @@
 
 A pixel triggers an event whenever the logarithm of its intensity has changed by a threshold since
 its last event (Lichtsteiner, Posch and Delbruck 2008). Events are interpolated between frames as in
-Rebecq et al., "ESIM", CoRL 2018; the spread of thresholds and the noise are those of Hu, Liu and
+Rebecq et al., "ESIM", CoRL 2018; the spread of thresholds and the noise follow Hu, Liu and
 Delbruck, "v2e", CVPRW 2021.
 
-The trigger levels of each pixel lie on a grid that is fixed for a sequence, so that the events
-between two instants do not depend on earlier events: none is lost or repeated at the border of two
+The trigger levels of each pixel lie on a grid that is fixed for a sequence. Events between two
+instants therefore do not depend on earlier events: none is lost or repeated at the border of two
 steps as long as the change continues in one direction.
 """
 
@@ -39,7 +39,7 @@ COLUMNS = (
     Column("x_px", "<u2", "column of the pixel"),
     Column("y_px", "<u2", "row of the pixel"),
     Column("polarity", "|i1", "1 brighter, -1 darker"),
-    Column("instance_id", "<u2", "what the pixel shows at the nearest frame; 0"),
+    Column("instance_id", "<u2", "instance at the pixel in the nearest frame; 0"),
 )
 THRESHOLD_MIN = 0.01
 BRIGHT_SHARE = 0.25

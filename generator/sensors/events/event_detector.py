@@ -1,6 +1,6 @@
 """Event detector: collisions, lane invasions and other events of its carrier, from ground truth.
 
-The events are those of CARLA's collision, lane invasion and obstacle detectors and of CoppeliaSim's
+The events match CARLA's collision, lane invasion and obstacle detectors and of CoppeliaSim's
 proximity sensors. They are computed from boxes and lanes, without noise.
 """
 
@@ -49,7 +49,7 @@ COLUMNS = (
         "|u1",
         "0 collision, 1 lane_invasion, 2 obstacle, 3 traffic_light, 4 proximity",
     ),
-    Column("instance_id", "<u2", "the other thing; 0 = none"),
+    Column("instance_id", "<u2", "the other object; 0 = none"),
     Column(
         "value",
         "<f4",
@@ -61,7 +61,7 @@ COLUMNS = (
 CLOSING_SPEED_MAX_M_S = 150.0
 """Bound for culling: no object approaches faster."""
 LOW_M = 0.2
-"""Objects lower than this above the carrier's ground are no obstacles."""
+"""Objects lower than this above the carrier's ground are not obstacles."""
 
 
 class EventDetector(Instrument):

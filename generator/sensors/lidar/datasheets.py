@@ -1,7 +1,7 @@
-"""Users' data sheets and beam tables of laser scanners, beside their configurations.
+"""Users' data sheets and beam tables of laser scanners, next to their configurations.
 
-The content of a file replaces its name in the configuration, so that plans are self-contained and
-errors name the file, line and column they come from.
+The content of a file replaces its name in the configuration: plans are self-contained, and errors
+name the file, line and column they come from.
 """
 
 from collections.abc import Mapping
@@ -77,7 +77,7 @@ def beam_table(path: Path) -> Node:
 
 
 def _load_sheet(path: Path) -> Node:
-    """Read a data sheet; its default name is that of the file."""
+    """Read a data sheet; its default name is the name of the file."""
     node = load_yaml(path)
     assert isinstance(node.content, Mapping)
     name = Node(node.position, path.stem, text=path.stem)
@@ -128,7 +128,7 @@ def _complete(sheet: Node) -> Node:
 
 
 def _looks_foreign(own: Mapping[str, Node]) -> bool:
-    """Whether a sheet has unknown keys, of which the usual message tells more."""
+    """Whether a sheet has unknown keys, which the usual message describes better."""
     return bool(own.keys() - LidarModel.model_fields.keys())
 
 

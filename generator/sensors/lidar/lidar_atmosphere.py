@@ -29,8 +29,9 @@ from gen_data.sensors.lidar.scan_pattern import LidarModel
 PULSE_LENGTH_M = 20e-9 * 299_792_458.0
 OVERLAP_M = (0.9, 1.0)
 SOFT_GAIN = 2.0e6 / 299_792_458.0
-"""Hahner et al. weight a hard target with 1e-6 / pi beside an integral over time: their receivers,
-less sensitive at short range, see fog weaker by this factor than the lidar equation alone."""
+"""Hahner et al. weight a hard target with 1e-6 / pi, and air with an integral over time: their
+receivers, less sensitive at short range, measure fog weaker by this factor than the lidar equation
+alone."""
 DROP_REFLECTANCE = 0.005
 """A clear sphere scatters the 2 % its surface reflects in all directions: a quarter, as a disc."""
 FLAKE_REFLECTANCE, FLAKE_GROWTH = 0.9, 10.0 ** (1.0 / 3.0)

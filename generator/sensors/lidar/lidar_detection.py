@@ -2,7 +2,7 @@
 
 Received light is ``reflectance / (range^2 + near^2) * exp(-2 * optical depth)``: the lidar equation
 of an extended target (Wandinger, "Introduction to Lidar", 2005), whose overlap function
-``range^2 / (range^2 + near^2)`` is that of a receiver focused at a distance: the blur of a near
+``range^2 / (range^2 + near^2)`` describes a receiver focused at a distance: the blur of a near
 target is larger than the detector, in proportion to 1 / range. A device with a second sensitivity,
 far away, also loses light exponentially (``LidarModel.loss_per_m``). The scanner's sensitivity sets
 the unit: light of 1 is detected half of the time.

@@ -1,4 +1,4 @@
-"""Laser scanner on a rig or beside a camera."""
+"""Laser scanner on a rig or next to a camera."""
 
 import math
 from dataclasses import dataclass, fields, replace
@@ -41,12 +41,12 @@ BEAMS_SCHEMA = {
 
 
 class LidarSensor(mounting.Mounted):
-    """A laser scanner on a rig, or mounted beside a camera.
+    """A laser scanner on a rig, or mounted next to a camera.
 
     Attributes:
         name: Its name in labels and files.
         model: A file of ``generator/sensors/lidar/presets``, or a data sheet of the same layout
-            beside the configuration: ``./my_lidar.yaml``. A sheet with ``like: VLP-16`` has all
+            next to the configuration: ``./my_lidar.yaml``. A sheet with ``like: VLP-16`` has all
             values of that scanner except its own: ``elevations_deg: [-10, -5, 0, 5]``,
             ``rotation_hz``, ``range_m``; without a rate, pulses are as dense in azimuth.
         beams: Replaces the model's lasers: elevation and azimuth offset to the left of each
@@ -62,11 +62,11 @@ class LidarSensor(mounting.Mounted):
         ideal: No noise, no missed return, no weather, no mirror images, a clean window: every hit
             within range.
         motion_distortion: Effect of the scanner's motion during a sweep. ``raw``: points are in
-            the lidar frame of each pulse's own instant. ``deskewed``: in that of the sweep's
+            the lidar frame at each pulse's instant. ``deskewed``: in the frame at the sweep's
             middle, as in KITTI's files; moving objects are where each pulse hit them. ``none``:
             all pulses leave in the middle of the sweep.
         faults: Dead beams and blocked parts of the window; null = none.
-        origins: Whether to write what each point comes from: its path (direct, through glass, by a
+        origins: Whether to write the origin of each point: its path (direct, through glass, by a
             mirror), and the true instance and position.
     """
 

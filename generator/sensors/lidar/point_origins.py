@@ -50,7 +50,7 @@ def make_origins(
         lidar: The scanner.
 
     Raises:
-        SampleError: the renderer does not state what mirrors show.
+        SampleError: the renderer does not state the mirrored surfaces.
     """
     origins: NDArray[np.void] = np.zeros(len(ids), ORIGIN)
     origins["true_instance_id"] = ids
@@ -64,7 +64,7 @@ def make_origins(
         shown = detour[by_mirror]
         if detours.mirrored_id is None or detours.mirrored_m is None:
             raise errors.SampleError(
-                f"sensor '{lidar.name}': origins: this renderer does not state what mirrors show"
+                f"sensor '{lidar.name}': origins: this renderer does not state mirrored surfaces"
             )
         origins["true_instance_id"][by_mirror] = detours.mirrored_id[shown]
         place_m[by_mirror] = detours.mirrored_m[shown]

@@ -1,7 +1,7 @@
 """Pseudo-LiDAR: the depth image of a camera as a point cloud.
 
-The name and the idea are those of Wang et al., "Pseudo-LiDAR from visual depth estimation", CVPR
-2019; the depth here is the true one. Formats that hold laser scans take it like any other cloud.
+After Wang et al., "Pseudo-LiDAR from visual depth estimation", CVPR 2019; the depth here is the
+true one. Formats that hold laser scans take it like any other cloud.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ MODEL = "pseudo_lidar"
 class PseudoLidar(Mounted):
     """Points of a camera's depth image: one pixel of each ``stride_px`` x ``stride_px``.
 
-    A point is what the depth image shows there, at the instant of the reading and without noise.
+    A point is the depth image's surface there, at the instant of the reading and without noise.
     Its intensity is 0, its ring the row of its pixel among the selected ones.
     The first pixel of each axis is number ``stride_px // 2``.
 
@@ -34,8 +34,8 @@ class PseudoLidar(Mounted):
         camera: Name of a camera listed before it, whose depth it takes. Without a rig, points are
             in a frame that moves with that camera and points along its axis.
         offset_m: Origin of the points' frame, from the camera's centre or on the rig: forward,
-            left, up. Above the camera by default, like a laser scanner, so that readers of KITTI's
-            format find the ground below the origin.
+            left, up. Above the camera by default, like a laser scanner: readers of KITTI's format
+            expect the ground below the origin.
         stride_px: Distance between selected pixels, in both axes.
         range_max_m: Points farther away from the camera are left out.
     """
@@ -108,7 +108,7 @@ class PseudoLidar(Mounted):
 def every_nth_pixel(camera: intrinsics.Intrinsics, stride_px: int) -> intrinsics.Intrinsics:
     """Intrinsics whose pixel centres are every n-th one of another camera's, from ``n // 2`` on.
 
-    Its rays are those of the selected pixels.
+    Its rays are the rays of the selected pixels.
     """
     first = stride_px // 2
     return replace(

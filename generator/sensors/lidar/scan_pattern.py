@@ -1,7 +1,7 @@
 """Data sheets of laser scanners, and the pulses of a sweep, from a scanner that may move.
 
 Frame: X forward, Y left, Z up. A rotating scanner starts facing backwards and turns clockwise seen
-from above, so that it faces ahead in the middle of its sweep. That is the scene's instant, as of
+from above; it faces ahead in the middle of its sweep. That is the scene's instant, as of
 KITTI's, which then triggers the cameras (Geiger et al., "Vision meets Robotics", 2013).
 """
 
@@ -59,7 +59,7 @@ class Sensitivity(Strict):
     """A device's sensitivity: the matte surface, square on, that it detects half of the time.
 
     Attributes:
-        reflectance: Of that surface.
+        reflectance: Reflectance of that surface.
         range_m: Distance of that surface.
     """
 
@@ -72,7 +72,7 @@ class Response(Strict):
 
     The laser's power follows the strength of the previous return, which compresses intensities. A
     reflectance c up to white gives ``(white + dark) * c * (1 + half) / (c + half) - dark``, or 0 if
-    that is negative (the curve is that of Naka and Rushton 1966). Range is compensated in part:
+    that is negative (the curve of Naka and Rushton 1966). Range is compensated in part:
     ``c = reflectance * (1 + (range / near)^2)^-p``.
 
     Attributes:
@@ -111,7 +111,7 @@ class LidarModel(Strict):
         range_step_m: Quantisation of ranges; 0 = none.
         divergence_mrad: Full divergence angle of a beam.
         pulse_m: Returns of one pulse that are closer than this merge.
-        wavelength_nm: Of the laser.
+        wavelength_nm: Wavelength of the laser.
         seen: Sensitivity.
         seen_far: Sensitivity to a brighter surface, farther away; null = light falls as within
             ``seen``. The range of data sheets grows less than with the square root of reflectance:
@@ -197,7 +197,7 @@ class LidarModel(Strict):
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """Blocks of lasers, from the top; a laser by itself is one of its own."""
+        """Blocks of lasers, from the top; a single laser is a block by itself."""
         given = self.elevations_deg
         if not any(isinstance(one, Block) for one in given):
             given = tuple(sorted(given, key=lambda up: -cast(float, up)))

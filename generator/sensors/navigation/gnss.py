@@ -187,8 +187,7 @@ class Fixes:
     Attributes:
         satellites: Number of visible satellites.
         valid: Whether there is a fix.
-        horizontal, vertical: Dilution of precision relative to that of the open sky; 1 without a
-            fix.
+        horizontal, vertical: Dilution of precision relative to an open sky's; 1 without a fix.
     """
 
     satellites: NDArray[np.intp]
@@ -251,7 +250,7 @@ def _dilution(sky: Array) -> Array:
 def _draw_slow_errors(times_s: Array, rate_hz: float, correlation_s: float, shared: Rng) -> Array:
     """A Gauss-Markov process of standard deviation 1 at each reading, [n, 3].
 
-    It is drawn from time 0 at every step, so that each step can be generated on its own.
+    It is drawn from time 0 at every step, to let each step be generated alone.
     """
     last = round(float(times_s[-1]) * rate_hz)
     kept = math.exp(-1.0 / (rate_hz * correlation_s))

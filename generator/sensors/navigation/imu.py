@@ -126,7 +126,7 @@ def _true_readings(scene: Scene, name: str, times_s: Array) -> Array:
 def _draw_errors(model: ImuModel, times_s: Array, rate_hz: float, rng: Rng) -> Array:
     """Bias, its random walk since time 0, and white noise, [n, 6].
 
-    The walk is drawn from time 0 at every step, so that each step can be generated on its own.
+    The walk is drawn from time 0 at every step, to let each step be generated alone.
     """
     shared = rng.of_sequence()
     bias = _per_axis(model, "bias") * shared.standard_normal(6)

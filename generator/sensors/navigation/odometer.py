@@ -12,7 +12,7 @@ Example, for a scene with a rig ``ego`` at the middle of the rear axle::
 ``time_s``, ``distance_m``, ``speed_m_s``, ``yaw_rate_rad_s``, ``steering_rad`` and the rim speeds
 ``wheel_rear_left_m_s`` ... ``wheel_front_right_m_s``.
 
-Wheels roll without slip, with Ackermann geometry at the front; the steering angle is that of the
+Wheels roll without slip, with Ackermann geometry at the front; the steering angle follows the
 bicycle model, ``atan(wheelbase * yaw rate / speed)``.
 """
 
@@ -132,7 +132,7 @@ def _speeds_and_yaw_rates(motion: MountMotion, times_s: Array) -> tuple[Array, A
 def _measure_distance_m(motion: MountMotion, times_s: Array, rate_hz: float) -> Array:
     """Signed distance travelled since time 0, [n]; reversing counts down.
 
-    Measured from time 0 at every step, so that each step can be generated on its own.
+    Measured from time 0 at every step, to let each step be generated alone.
     """
     count = round(float(times_s[-1]) * rate_hz) * CHORDS
     poses = [motion.pose(k / (rate_hz * CHORDS)) for k in range(count + 1)]

@@ -6,7 +6,7 @@ Processing", 2nd ed., 2014, chapter 6). Every cell is therefore assigned to its 
 that one to its own, and so on; all cells that end at the same peak form one detection with the sum
 of their power, at its centroid.
 
-Radar cross sections (RCS) at 77 GHz are those of road users by category, and of all else by area.
+Radar cross sections (RCS) at 77 GHz are given by category for road users, and by area for all else.
 Sources and values are in ``targets.yaml`` and ``surfaces.yaml``.
 """
 
@@ -93,7 +93,7 @@ class Cells:
 
 
 def make_cells(lit: Echo, look: Look) -> Cells:
-    """Merge the echoes of rays by cell; labels are those of the strongest ray."""
+    """Merge the echoes of rays by cell; labels are taken from the strongest ray."""
     fine = look.resolution
     upward = math.radians(fine.elevation_deg)
     bins = (
@@ -132,7 +132,7 @@ def find_peaks(cells: Cells, power: Array) -> NDArray[np.int64]:
 def merge_echoes(echo: Echo, group: NDArray[np.int64], power: Array) -> Echo:
     """Merge echoes by group: RCS and signal add up, the rest are power-weighted means.
 
-    Labels are those of the strongest echo.
+    Labels are taken from the strongest echo.
     """
     count = int(group.max()) + 1 if len(group) else 0
     total = np.bincount(group, power, count)

@@ -3,7 +3,7 @@
 Rays sample the illuminated surfaces, each for its solid angle. All echoes in one cell of range,
 azimuth, elevation and velocity add up to one whose RCS fluctuates from reading to reading
 (Swerling's first case): the signal in units of noise is exponential with mean ``1 + SNR``, and a
-detection is a signal above ``-ln(p)`` for a probability ``p`` of false alarm, so that
+detection is a signal above ``-ln(p)`` for a probability ``p`` of false alarm, hence
 
     P(detection) = p^(1 / (1 + SNR)),    SNR ~ RCS / range^4
 
@@ -51,9 +51,9 @@ COLUMNS = (
     Column("velocity_compensated_m_s", "<f4", "the same without the radar's own motion"),
     Column("rcs_dbsm", "<f4", "radar cross section as measured, fluctuation included"),
     Column("snr_db", "<f4", "signal over noise"),
-    Column("instance_id", "<u2", "what sent most of it back; 0 = unlabelled or noise"),
+    Column("instance_id", "<u2", "the strongest reflector; 0 = unlabelled or noise"),
     Column("category_id", "<u2", "of that instance; 0"),
-    Column("origin", "|u1", "0 false alarm, 1 a thing with an instance id, 2 ground and the like"),
+    Column("origin", "|u1", "0 false alarm, 1 a labelled object, 2 an unlabelled surface"),
 )
 PRESETS = "gen_data.sensors.radar.presets"
 FALSE_ALARM = 1e-6
@@ -232,7 +232,7 @@ def _ray_echoes(scene: Scene, radar: str, rays: Rays, hits: LidarHits) -> Echo:
 def _instance_rcs_m2(
     instance: Instance, areas_m2: Array, surfaces: NDArray[np.uint8], towards_radar: Array
 ) -> Array:
-    """RCS of the rays on one instance, [n]; that of a target is divided by visible area."""
+    """RCS of the rays on one instance, [n]; a target's RCS is divided by visible area."""
     target = TARGETS.get(instance.category)
     if target is None:
         return areas_m2 * area_factor(instance.category, surfaces)

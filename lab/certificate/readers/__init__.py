@@ -1,7 +1,7 @@
 """Readers of exported formats: one file and one line in this table each.
 
-A reader opens an export with the package that the format's users have, never with code of ours, and
-tells what it found. A format without a line here is not checked, which the certificate says.
+A reader opens an export with the package that the format's users have, never with gen-data's code,
+and returns its contents. A format without a line here is not checked, which the certificate states.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ class Load(Protocol):
 
         Raises:
             ImportError: the package is not installed.
-            Exception: of any kind, if the package refuses the export.
+            Exception: any exception, if the package refuses the export.
         """
         ...
 
@@ -52,7 +52,7 @@ class Reader:
         return function
 
     def versions(self) -> Mapping[str, str]:
-        """Installed releases of its packages, by name; only of those that are installed."""
+        """Installed releases of its packages, by name; only of installed ones."""
         found = {}
         for name in (self.package, *self.further):
             try:
@@ -62,7 +62,7 @@ class Reader:
         return found
 
     def missing(self) -> str:
-        """What to install; empty if all packages are."""
+        """Command that installs the missing packages; empty if none is missing."""
         absent = sorted({self.package, *self.further} - {*self.versions()})
         return f"install {' '.join(absent)}: {install_command('certify')}" if absent else ""
 

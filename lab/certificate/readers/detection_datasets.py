@@ -26,7 +26,7 @@ def load_yolo(root: Path, stored: StoredSamples) -> labelled_images.Loaded:
 
 
 def load_voc(root: Path, stored: StoredSamples) -> labelled_images.Loaded:
-    """Read all boxes; splits are those of ``ImageSets/Main``."""
+    """Read all boxes; splits come from ``ImageSets/Main``."""
     from supervision import DetectionDataset
 
     del stored

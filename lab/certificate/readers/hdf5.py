@@ -10,7 +10,7 @@ from gen_data.runner.stored import StoredSamples
 
 
 def load_hdf5(root: Path, stored: StoredSamples) -> Loaded:
-    """Read all arrays of every image; boxes are those of the pixels of each listed instance.
+    """Read all arrays of every image; boxes enclose the pixels of each listed instance.
 
     Counts files only if cameras write no image of instances.
     """

@@ -9,7 +9,7 @@ from gen_data.runner.stored import StoredSamples
 
 
 def load_mcap(root: Path, stored: StoredSamples) -> Loaded:
-    """Decode every message, with the sums of all chunks; count those of images and scans."""
+    """Decode every message, with the sums of all chunks; count messages of images and scans."""
     from mcap.reader import make_reader
     from mcap_protobuf.decoder import DecoderFactory
 

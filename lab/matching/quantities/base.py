@@ -1,4 +1,4 @@
-"""Types of quantities: what a statistic measures, and which parameter answers for it."""
+"""Types of quantities: the statistic that each measures, and the parameter that it fits."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -29,9 +29,9 @@ class CameraQuantity:
 
     Attributes:
         name: In tables.
-        unit: Of the parameter.
-        statistic: What is measured in each picture, in words.
-        path: Of the field in a sensor.
+        unit: Unit of the parameter.
+        statistic: Statistic of each picture, in words.
+        path: Path of the field in a sensor.
         measure: The statistic of a picture; NaN = not measurable.
         start: Coordinate of a pipeline's own, typical value.
         apply: The pipeline with one value of the parameter, given by its coordinate.
@@ -111,7 +111,7 @@ class FieldChange:
 
 
 class NoParameter(Exception):
-    """A configuration has no parameter that a quantity could fit; the text says why."""
+    """A configuration has no parameter that a quantity could fit; the text explains why."""
 
 
 def with_model(sensor: LidarSensor, **changes: Any) -> LidarSensor:

@@ -3,7 +3,7 @@
 Statistic: the blur of sharp edges, from their gradients at two scales (Zhuo and Sim, "Defocus map
 estimation from a single image", Pattern Recognition 44, 2011). A step blurred by ``s`` and filtered
 with a Gaussian of ``a`` has its peak gradient in proportion to ``1 / sqrt(s^2 + a^2)``: the ratio
-at two scales gives ``s``. Blurs add in quadrature, so that the coordinate is the square.
+at two scales gives ``s``. Blurs add in quadrature: the coordinate is the square.
 """
 
 import math
@@ -21,9 +21,9 @@ from gen_data.sensors.camera.image_pipeline import ImagePipeline
 
 FINE_PX, COARSE_PX = 0.8, 1.6
 EDGES = 0.02
-"""Share of the pixels, those with the largest gradients, among which edges lie."""
+"""Share of the pixels, by largest gradients, among which edges lie."""
 SHARPEST = 70.0
-"""Percentile of sharpness among edges: shadows and round things are blurred by themselves."""
+"""Percentile of sharpness among edges: shadows and round objects are blurred by themselves."""
 LEAST_GRADIENT = 2.0
 """Smallest gradient of an edge [grey values per pixel]."""
 

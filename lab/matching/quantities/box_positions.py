@@ -38,7 +38,7 @@ def _change(config: Config, camera: str, coordinate: float) -> base.FieldChange:
         if isinstance(sensor, Mounted) and sensor.name == camera and sensor.rig:
             value = base.map_numbers(sensor.pitch_deg, shifted, kept)
             return base.FieldChange("sensors", number, "pitch_deg", value)
-    raise base.NoParameter("no camera_on_lane and no rig sets a pitch; camera_pose aims at things")
+    raise base.NoParameter("no camera_on_lane and no rig sets a pitch; camera_pose aims at objects")
 
 
 def _slope(focal_heights: float) -> float:

@@ -1,4 +1,4 @@
-"""Sizes of boxes: the distance of the camera from what it looks at.
+"""Sizes of boxes: the distance of the camera from its objects.
 
 Statistic: the mean size of the boxes of an image, relative to the image. For a pinhole, sizes are
 inversely proportional to distances.
@@ -46,7 +46,7 @@ def _slope(focal_heights: float) -> float:
 
 
 BOX_SIZES = base.LabelQuantity(
-    "box sizes", "factor", "mean log2 of the size of boxes over that of the image",
+    "box sizes", "factor", "mean log2 of the size of boxes over the image's size",
     measure, _slope, _change,
     indirect_inference.Axis(-3.0, 3.0, step=0.25, plausible=1.0, enough=0.15, varies=False),
     to_value=base.power_of_two,

@@ -1,4 +1,4 @@
-"""Exposure: how far pictures are from what the camera's meter would set.
+"""Exposure: how far pictures are from the camera's metered exposure.
 
 Statistic: the mean logarithm of luminance, which automatic exposure keeps about constant from scene
 to scene (Reinhard et al., "Photographic tone reproduction for digital images", 2002).

@@ -6,7 +6,7 @@ with the most likely steps (Fan and de Queiroz, "Identification of bitmap compre
 detection and quantizer estimation", IEEE Transactions on Image Processing 12, 2003). Scaling,
 cropping off the grid of blocks and strong processing after compression hide it.
 
-Tables are those of ITU-T T.81, annex K.1, scaled as libjpeg does.
+Tables come from ITU-T T.81, annex K.1, scaled as libjpeg does.
 """
 
 from functools import cache
@@ -30,7 +30,7 @@ _STEPS = np.array([
 ])  # fmt: skip
 """Luma steps of quality 50, row by row."""
 QUALITIES = range(20, 99)
-"""Qualities that are sought in pixels: finer steps than those of 98 are lost in rounding."""
+"""Qualities that are sought in pixels: finer steps than at 98 are lost in rounding."""
 ROUNDING = 0.4
 """Assumed standard deviation of coefficients from multiples of their steps: rounding to colours."""
 OUTLIERS = 0.02
@@ -40,7 +40,7 @@ LEAST = 1.5
 """Smallest coefficients that tell steps apart."""
 COEFFICIENTS_MIN = 300
 EVIDENCE = 0.15
-"""Mean log-likelihood per coefficient, above that of no compression, that counts as found."""
+"""Mean log-likelihood per coefficient, in excess of no compression, that counts as found."""
 
 
 def measure(photo: recordings.Photo) -> float:

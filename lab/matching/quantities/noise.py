@@ -3,7 +3,7 @@
 Statistic: variance in linear light of the flattest blocks that are bright, where photons make most
 of it. Noise is variance as a function of level, a line of slope and intercept at the sensor (Foi et
 al., "Practical Poissonian-Gaussian noise modeling and fitting for single-image raw-data", IEEE
-Transactions on Image Processing 17, 2008), which the tone curve bends. Variances are those of
+Transactions on Image Processing 17, 2008), which the tone curve bends. Variances come from
 ``Picture.noise_blocks``.
 """
 
@@ -23,12 +23,12 @@ from gen_data.sensors.camera.image_sensor import ImageSensor
 BLOCKS_MIN = 40
 """Smallest number of blocks between the grey values."""
 FLATTEST = 0.3
-"""Share of the blocks that counts, those with the smallest gradients after smoothing."""
+"""Share of the blocks that counts: blocks with the smallest gradients after smoothing."""
 DARKEST, BRIGHTEST = 40.0, 215.0
 """Grey values between which the tone curve keeps noise, and photons make most of it."""
 USUAL_LEVEL = 0.05
 """Linear level at which photon and read noise of usual cameras are equal. Variances are relative to
-the sum of both, so that the levels in a picture hardly matter."""
+the sum of both, which makes them almost independent of the levels in a picture."""
 LEAST = 2e-8
 """Relative variance added before the logarithm: no noise at all has a value."""
 

@@ -1,10 +1,10 @@
-"""Read noise: what the readout of each pixel adds, whatever its light.
+"""Read noise: noise of the readout of each pixel, whatever its light.
 
 Statistic: variance in linear light of flat dark blocks, where few photons let read noise be seen:
-the intercept of the noise level function, whose slope is that of ``noise``.
+the intercept of the noise level function, whose slope ``noise`` measures.
 
 Contrast bends that function: an error of 0.1 in contrast is one of a factor of 1.8 in read noise.
-So both kinds of noise are ``late``, after contrast, which hardly depends on them.
+So both kinds of noise are ``late``, after contrast, which depends on them little.
 """
 
 import math
@@ -21,7 +21,7 @@ DARKEST, BRIGHTEST = 6.0, 64.0
 """Grey values of dark blocks: below, clipping at black takes half of the noise; up to middle tones,
 as most pictures have only few darker blocks."""
 LEAST_E = 0.25
-"""Smallest read noise to be fitted [electrons]: that of the best sensors there are."""
+"""Smallest read noise to be fitted [electrons]: the noise of the best sensors there are."""
 
 measure = noise.noise_between(DARKEST, BRIGHTEST)
 

@@ -452,7 +452,7 @@ def test_given_values_win_over_a_preset() -> None:
 
 @pytest.mark.parametrize(("values", "fact"), [
     ({"preset": "fone"}, "phone.*did you mean 'phone'"),
-    ({"color_matrix": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "grey stays grey"),
+    ({"color_matrix": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "grey pixels grey"),
     ({"exposure_control": {"time_s": [0.1, 0.01]}}, "time_s must rise"),
     ({"vignetting": 1.5}, "1.5"),
 ])  # fmt: skip
