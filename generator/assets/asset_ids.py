@@ -51,7 +51,7 @@ class AssetId:
 
 @lru_cache(maxsize=1024)
 def parse_asset_id(text: str) -> AssetId:
-    """Parse an asset id; the latest are kept, since a scene asks for each of its assets often.
+    """Parse an asset id; the latest are kept, since a scene parses the id of each asset often.
 
     Raises:
         AssetError: if it is malformed.
