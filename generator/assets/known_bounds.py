@@ -1,6 +1,7 @@
 """Bounds of procedural objects that come with the package.
 
-Bounds decide where objects stand, and scenes try several times as many objects as they keep. With empty caches, each of them would be made for its bounds alone.
+Bounds decide where objects stand, and scenes try several times as many objects as they keep. With
+empty caches, each of them would be made for its bounds alone.
 
 The table is ``BOUNDS`` of ``content``: a row of a key and two corners for the mesh of each
 object, followed by a row with the same key for its body, if it has one, sorted by key. A key has
