@@ -151,7 +151,7 @@ def _mishap(
     number: int,
     shown: "Demonstration",
 ) -> errors.Rejection | None:
-    """Precede the first grasp: by a blow, or another body in the hand, which it may put back."""
+    """Carry out a failure before the first grasp: a blow, or a wrong body, which it may put back."""
     if assignment.failure == "collision":
         steps: list[tuple[scene.ArmGoal | None, str]] = [(None, "approach")]
     else:
