@@ -20,7 +20,7 @@ FOLDERS = (
     *("annotations", "api", "assemble", "assets", "cli", "config", "core", "physics", "pipeline"),
     *("packs", "preview", "report", "roads", "rooms", "runner", "sensors", "sky", "traffic", "usd"),
 )
-LABORATORY = ("certificate", "environment", "matching", "study", "write")
+LABORATORY = ("carry_over", "certificate", "environment", "matching", "study", "write")
 SOURCES = (
     *(f"generator/{folder}/**/*.py" for folder in FOLDERS),
     *(f"lab/{folder}/**/*.py" for folder in LABORATORY),
