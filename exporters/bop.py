@@ -155,7 +155,7 @@ class Bop(base.AssetExporter):
         targets: list[dict[str, int]] = []
         rows = fragments.fragment_rows(shard_dirs, self.type, IMAGES)
         size = self._folder_size(info)
-        # Rows come in the order of samples, so that one folder after the other is complete.
+        # Rows come in the order of samples: one folder after the other is complete.
         for number, members in groupby(rows, lambda item: int(item[1]["index"]) // size):
             by_split: dict[str, list[tuple[Path, dict[str, Any]]]] = {}
             for shard_dir, row in members:

@@ -212,8 +212,8 @@ def polygons_of(instances: UInt16) -> Iterator[dict[str, Any]]:
     """
     classes = list(city_classes().by_name.values())
     outlines: list[tuple[float, str, list[list[int]]]] = []
-    # Pixels of one part have common edges: what a part surrounds, also by pixels that only touch at
-    # corners, then consists of other parts.
+    # Pixels of one part have common edges: its enclosed areas, also of pixels that only touch at
+    # corners, then consist of other parts.
     parts, found = label_regions.find_parts(instances)
     for part, (code, box) in enumerate(found):
         kind = classes[code // PER_CLASS if code >= PER_CLASS else code]

@@ -291,7 +291,7 @@ def _metadata_lines(clip: str, frames: Sequence[sequences.Frame], suffix: str) -
     for k, frame in enumerate(frames):
         files = {f"{kind}_file_name": f"{clip}/{kind}/{k:06d}.png" for kind in CONTROLS}
         row = {
-            # Beside other columns of images, a plain ``file_name`` becomes the first of them.
+            # Next to other columns of images, a plain ``file_name`` becomes the first of them.
             "image_file_name": f"{clip}/rgb/{k:06d}{suffix}",
             **files,
             "text": frame.row["text"],

@@ -132,7 +132,7 @@ def _tokens(
 ) -> NDArray[np.int64]:
     """Tokens of the stream: per pixel or head its literals, copies of it, and zeros."""
     count, step = literals.shape
-    # Copies have at least three bytes; what is left is repeated literally.
+    # Copies have at least three bytes; the rest is repeated literally.
     copies, rest = np.divmod(copied, LONGEST)
     gap_copies, gap_rest = np.divmod(np.maximum(zeros - 1, 0), LONGEST)
     short, gap_short = rest < SHORTEST, gap_rest < SHORTEST
@@ -198,7 +198,7 @@ def join_bits(values: Int64, sizes: Int64) -> bytes:
     end = np.cumsum(sizes)
     word, shift = np.divmod(end - sizes, 32)
     first = np.flatnonzero(np.diff(word, prepend=-1))
-    # The fields of a word do not overlap, so that their sum is their union.
+    # The fields of a word do not overlap: their sum is their union.
     sums = np.add.reduceat(values.astype(np.uint64) << shift.astype(np.uint64), first)
     words = np.zeros(int(word[-1]) + 2, np.uint64)
     words[word[first]] = sums & np.uint64(0xFFFFFFFF)
@@ -214,7 +214,7 @@ def token_table() -> tuple[Int64, Int64, Int64]:
     length = SHORTEST
     spans = [*enumerate(_LENGTH_EXTRA_BITS, _FIRST_LENGTH), (_SYMBOLS - 1, 0)]
     for code, bits in spans:
-        # The longest copy has a code of its own.
+        # The longest copy has a separate code.
         length = LONGEST if code == _SYMBOLS - 1 else length
         for base in (_COPY_PIXEL, COPY_ZERO):
             covered = slice(base + length, base + length + (1 << bits))

@@ -78,7 +78,7 @@ def _fixed_codes() -> tuple[Int64, Int64]:
     symbol, extra, extra_bits = label_png.token_table()
     lengths = np.repeat([8, 9, 7, 8], [144, 112, 24, 8])
     bits = lengths[symbol]
-    # Distances have five bits, and that of the byte before is 0.
+    # Distances have five bits; the distance of the byte before is 0.
     distance_bits = 5 * (np.arange(label_png.TOKENS) >= label_png.COPY_ZERO)
     values = label_png.canonical_codes(lengths)[symbol] | extra << bits
     return values, bits + extra_bits + distance_bits

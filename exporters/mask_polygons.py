@@ -48,7 +48,7 @@ def mask_polygons(mask: MaskPx) -> list[Polygon]:
     corners = _find_corners(pixels)
     bridges: dict[int, list[tuple[int, Polygon]]] = {}
     polygons = []
-    # A hole is attached to a border above it, so that lower borders are complete before.
+    # A hole is attached to a border above it; lower borders are complete before.
     for border in reversed(_trace_borders(corners)):
         path = _follow(border, corners, bridges)
         x, y = path[0].tolist()

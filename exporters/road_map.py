@@ -442,7 +442,7 @@ def _stop_line(block: Block, driving: Sequence[Lane], paint: PaintIndex) -> Stop
         end = np.array([x1, y1])
         strip = shapely.Polygon([end + along * ahead + t * left for along, t in corners])
         thin_m = 0.5 * STOP_WIDTH_M[0]
-        # Narrow lines vanish, and what is wider keeps its corners.
+        # Narrow lines vanish, and wider ones keep their corners.
         wide = paint.inside(strip).buffer(-thin_m, join_style="mitre")
         for part in _polygons(wide.buffer(thin_m, join_style="mitre")):
             around = shapely.get_coordinates(part) - end

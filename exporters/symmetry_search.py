@@ -149,7 +149,7 @@ class _Search:
         if all(self.fit(axis, angle_rad) is not None for angle_rad in ANGLES_RAD):
             return 0
         fits = {n: fit for n in FOLDS if (fit := self._fit_of_fold(axis, n)) is not None}
-        # No fit is better than that of sampling.
+        # No fit is better than the sampling.
         good = FIT * max(min(fits.values(), default=0.0), self._still.distance)
         return max((n for n, fit in fits.items() if fit <= good), default=None)
 

@@ -197,7 +197,7 @@ class Flight:
 
     Attributes:
         bank_rad, swing_rad: Mean and amplitude of the bank, positive in left turns.
-        rate_rad_s, phase_rad: Of the swing.
+        rate_rad_s, phase_rad: Rate and phase of the swing.
     """
 
     speed_m_s: float

@@ -119,7 +119,7 @@ def frame(
     if np.isnan(ray).any():
         return None
     turned = _turn(framing, ray)
-    # Moved along one line without turning, a camera keeps the thing's centre in its place.
+    # Moved along one line without turning, a camera keeps the object's centre in its place.
     around = turned.inverse().apply(thing.points_m - thing.center_m)
 
     def share_at(distance_m: float) -> float:
@@ -158,7 +158,7 @@ def distance_for_share(
     """
 
     def error(distance_m: float) -> float:
-        # Nearly proportional to the distance, so that secants converge within a few steps.
+        # Nearly proportional to the distance: secants converge within a few steps.
         return wanted / share_at(distance_m) - 1.0
 
     bracket = _bracket(error, start_m)

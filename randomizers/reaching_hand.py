@@ -160,7 +160,7 @@ class ReachingHand(asset_groups.GroupRandomizer):
         points = {point.name: point.position_m for point in assets.keypoints(asset)}
         knuckle = points["index_1"]
         axis = declared("hand", "held_axis_m")(seed, [1e-3 * r for r in radii_mm])
-        # The wrist's height is that of the hand's middle, where radii were measured.
+        # The wrist is as high as the hand's middle, where radii were measured.
         middle_z = points["wrist"][2]
         hand_low = assets.bounds_m(asset)[0][2]
         at_m = -low[2] + 0.02 * (high[2] - low[2])

@@ -105,7 +105,7 @@ def _make_lamp(
     return Light(
         name,
         "spot",
-        # Just below the glass, so that the lamp's housing does not shade its own light.
+        # Just below the glass: the lamp's housing must not shade its own light.
         position_m=(round(x, 6), round(y, 6), round(z - 0.05, 6)),
         direction=(0.0, 0.0, -1.0),
         color=color,

@@ -62,7 +62,7 @@ class LevelCrossing(element.Element):
         track = element.parametric_id("railway_track", length_m=self.track_m, seed=self.seed % 4)
         for word, side in (("left", 1), ("right", -1)):
             edge_m, edge_z_m = place.edge_m(side, land=False)
-            # The ballast lies over the land beside the road, and over the ground around.
+            # The ballast lies over the land next to the road, and over the ground around.
             head_m = max(edge_z_m, _GROUND_M) + _HEAD_M
             at_m = side * (edge_m + 0.5 * self.track_m)
             pose = place.pose(at_m, head_m - declared("railway_track", "rail_top_m"), 0.5 * math.pi)

@@ -56,7 +56,7 @@ class Prop(element.PlacedElement):
         )
         T_world_base = (self.pose(scene) @ se3.SE3((0.0, 0.0, -float(lowest_m)))).rounded()
         parts = tuple(link for link in thing.links if link in thing.visuals)
-        # The frame of an instance is that of its first body, which should not move with a joint.
+        # An instance has the frame of its first body, which should not move with a joint.
         rigid = kinematics.rigid_group(thing, thing.links[0])
         bodies = tuple(
             Body(

@@ -39,7 +39,7 @@ class Room(Element):
             "door": int(self.door),
             "window": int(self.window),
         }
-        # Left out where it is the default, so that rooms keep their ids.
+        # Left out where it is the default: rooms keep their ids.
         if not self.walls:
             shape["walls"] = 0
         asset = parametric_id("room", **shape)

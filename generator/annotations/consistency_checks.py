@@ -76,7 +76,7 @@ def _silhouette_faults(
 def _share_faults(truth: ObjectTruth) -> Iterator[str]:
     for name in ("visible_fraction", "occlusion", "truncation"):
         share = getattr(truth, name)
-        # Written so that NaN is a fault.
+        # Written to make NaN a fault.
         if share is not None and not 0.0 <= share <= 1.0:
             yield f"its {name} is {share}, outside [0, 1]"
 
@@ -85,7 +85,7 @@ def _pose_faults(truth: ObjectTruth) -> Iterator[str]:
     for name in ("box3d_world", "box3d_camera"):
         box = getattr(truth, name)
         if box is not None:
-            # A flat thing has one side of length 0; a point is a box that was never measured.
+            # A flat object has one side of length 0; a point is a box that was never measured.
             if not (all(0 <= side < math.inf for side in box.size_m) and max(box.size_m) > 0):
                 yield f"its {name} has the size {box.size_m} m"
             if not _is_rigid(box.T_frame_box):

@@ -144,7 +144,7 @@ def _fill(
         for body in _by_rank(bodies_near(kept, T_frame_world, box, assets), scene)
         if (samples := sample_body(body, T_frame_world @ body.T_world_body, box, assets))
     ]
-    # Later ones overwrite earlier ones: interiors first, then what matters most last.
+    # Later ones overwrite earlier ones: interiors first, the most important ones last.
     painter = VoxelPainter(box)
     for number, samples in found:
         ink = _inks(INTERIOR, number, np.zeros(1, np.uint8))

@@ -313,7 +313,7 @@ def _contains(outer: MaskPx, inner: MaskPx) -> bool:
 def _share_faults(item: ObjectTruth) -> Iterator[Fault]:
     for name in ("visible_fraction", "occlusion", "truncation"):
         share = getattr(item, name)
-        # Written so that NaN is a fault.
+        # Written to make NaN a fault.
         if share is not None and not 0.0 <= share <= 1.0:
             yield name, f"{share} is not in [0, 1]"
     if item.detectability is not None and not 0.0 <= item.detectability < math.inf:

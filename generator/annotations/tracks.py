@@ -89,7 +89,7 @@ class Tracks(Strict):
     ) -> EgoTruth:
         """Fill in ``tracks``."""
         points = begun.points
-        # Scenes are kept, so that their ids stay theirs.
+        # Scenes are kept: their ids must not be used again.
         placed: dict[int, _Placed] = {}
 
         def at(then: Scene) -> _Placed:

@@ -63,7 +63,7 @@ def recipe(
     path = Path(path_text("source", source))
     try:
         is_kept, is_made = is_recipe(path), path.is_dir()
-    except OSError:  # No file can have this name, which load_config says.
+    except OSError:  # No file can have this name; load_config reports it.
         is_kept = is_made = False
     if is_kept or is_made:
         if n is not None or seed is not None or overrides or without:

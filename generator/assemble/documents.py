@@ -233,7 +233,7 @@ def _override_elements(elements: Node, overrides: Node) -> Node:
         if name in by_name:
             by_name[name] = merge_nodes(by_name[name], node)
         elif node.get("type") is not None:
-            # New elements come after those of the template.
+            # New elements come after the template's.
             by_name[name] = node
         else:
             fact = f"the template has no element {quote_value(name)}; expected one of "

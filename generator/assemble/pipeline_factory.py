@@ -176,7 +176,7 @@ def _check_references(
             except ConfigError as error:
                 path, _, fact = str(error).partition(": ")
                 field = path.removeprefix(f"randomizers.{randomizer.name}.")
-                # A field with its default has no position of its own.
+                # A field with its default has no position.
                 item = config.document.entries["randomizers"].items[number]
                 position = (item.get(field) or item).position
                 problems.add(position, f"randomizers[{number}].{field}", fact)
@@ -285,7 +285,7 @@ def _check_engine(config: Config) -> None:
     """Raise ConfigError if the physics engine is not installed."""
     missing = missing_engine(config.general.physics.engine)
     if missing:
-        # The default has no position of its own.
+        # The default has no position.
         node = config.document.get("physics", "engine") or config.document
         refuse(node.position, "physics.engine", missing)
 

@@ -135,7 +135,7 @@ def check_text(
         turns[family] = order[asset_id] = turns.get(family, -1) + 1
     known = known_families()
     for asset_id in sorted(ids, key=order.__getitem__):
-        # Of files it is not known what is on their images.
+        # The contents of images in files are unknown.
         if isinstance(known.get(asset_id.partition("?")[0]), Family):
             own = tuple(material.texture for material in assets.materials(asset_id))
             if can_write(assets, (asset_id, *own)):

@@ -92,7 +92,7 @@ class DiskCache:
 
     def _path(self, key: str) -> str:
         # Versions of this program that store other arrays may share the folder. As text: a scene
-        # asks for hundreds of files, and a Path takes longer than opening one.
+        # reads hundreds of files, and a Path takes longer than opening one.
         return f"{self.folder}/format-{FORMAT}/{key[:2]}/{key}.arrays"
 
     def load_json(self, name: str) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def _is_current(folder: Folder, row: Any) -> bool:
         file, state, digest = row
         if digest == _MISSING:
             return not folder.exists(file)
-        # As text: a start asks for thousands of files, and a Path takes longer than the system.
+        # As text: a start checks thousands of files, and a Path takes longer than the system.
         status = os.stat(f"{folder.root}/{file}")  # noqa: PTH116
         return bool(state == _state(status)) and isinstance(digest, str)
     except (OSError, TypeError, ValueError):

@@ -176,7 +176,7 @@ def _clip_triangles(corners: Float64, axis: int, at: float, side: float) -> Floa
     whole = corners[above.all(axis=1)]
     split = above.any(axis=1) & ~above.all(axis=1)
     corners, height, above = corners[split], height[split], above[split]
-    # Rotate each triangle so that the corner that is alone on its side comes first.
+    # Rotate each triangle: the corner that is alone on its side comes first.
     alone = np.where(above.sum(axis=1) == 1, np.argmax(above, axis=1), np.argmin(above, axis=1))
     turn = (alone[:, None] + np.arange(3)) % 3
     corners = np.take_along_axis(corners, turn[..., None], axis=1)

@@ -138,7 +138,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         solid = join_soups(collides).transformed(matrix).transformed(scaling)
         check_coordinates(solid, place)
     else:
-        # Decimated, so that decomposition stays fast.
+        # Decimated, to keep decomposition fast.
         solid = TriangleSoup.of(mesh.vertices_m.astype(np.float64)[mesh.faces])
         solid = decimate(solid, entry.max_faces) if len(solid) > entry.max_faces else solid
     collision = convex_parts(solid, place, entry.parts)
@@ -214,7 +214,7 @@ def import_link(
         images |= {} if colored.image is None else {IMAGE: colored.image}
         unused = (*(text for source in sources for text in source.remarks), *colored.remarks)
         remarks = _remarks_of(entry.file, unused)
-        # Images inside mesh files are those of the link, all others those of the robot.
+        # Images inside mesh files belong to the link, all others to the robot.
         owner = f"{robot_id}/{link_name}" if images else robot_id
         soup = _apply_finishes(colored.soup, entry.materials, place, owner)
         budget = max(entry.max_faces, 0 if colored.image is None else len(soup))

@@ -326,7 +326,7 @@ class _Reader:
         geoms = range(first, first + int(model.body_geomnum[body])) if first >= 0 else range(0)
         colliding = {g: bool(model.geom_contype[g] or model.geom_conaffinity[g]) for g in geoms}
         shown = [g for g in geoms if model.geom_group[g] < _SHOWN_GROUPS]
-        # Where a body has geoms for the eye only, those of other groups are for collisions only.
+        # Where a body has geoms for the eye only, geoms of other groups are for collisions only.
         groups = {int(model.geom_group[g]) for g in shown if not colliding[g]}
         visuals, collisions = [], []
         for g, shape in self._geoms(body, geoms):

@@ -99,7 +99,7 @@ def make_mesh(soup: TriangleSoup, normals: Float64) -> MeshData:
     """Build an indexed mesh from a soup and unit normals [m, 3, 3]; equal corners are merged."""
     slots, slot_of = _merge_slots(soup)
     uvs = np.zeros((len(soup), 3, 2)) if soup.uvs is None else soup.uvs
-    # Rounded to grids finer than any visible detail, so that noise does not split vertices.
+    # Rounded to grids finer than any visible detail: noise must not split vertices.
     keys = np.concatenate(
         [
             np.rint(soup.corners.reshape(-1, 3) / _grid_size(soup.corners)).astype(np.int64),

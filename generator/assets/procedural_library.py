@@ -72,7 +72,7 @@ class ProceduralLibrary:
             return replace(level, asset_id=str(asset_id), sha256=digest)
         if not _is_offered(asset_id, family):
             return self._describe(asset_id, family)
-        # The family is held beside its id(), which no other object can have as long.
+        # The family is held next to its id(), which no other object can have as long.
         name = f"{id(family)}/{asset_id}"
         return _offered.get(name, lambda: (family, self._describe(asset_id, family)))[1]
 

@@ -152,7 +152,7 @@ class Sandbox:
             child.kill()
             status = child.wait()
         for pipe in (child.stdin, child.stdout):
-            # Closing flushes what the child no longer receives.
+            # Closing flushes data that the child no longer receives.
             with suppress(BrokenPipeError):
                 if pipe is not None:
                     pipe.close()

@@ -134,7 +134,7 @@ def _resize(image: UInt8, width: int, height: int) -> UInt8:
 
 
 def trim_unreached_holes(soup: TriangleSoup, image: Callable[[str], UInt8]) -> TriangleSoup:
-    """Drop coverage maps whose holes the mesh does not really reach.
+    """Drop coverage maps whose holes the mesh reaches at seams only.
 
     Texture atlases are transparent around their charts. Faces touch those areas at seams only,
     where holes would be pinholes; without them the mesh stays solid and renders faster.

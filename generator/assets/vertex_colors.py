@@ -134,7 +134,7 @@ def _bake(
     encoded = np.rint(colorimetry.srgb_encode(np.clip(texels, 0.0, 1.0)) * 255.0).astype(np.uint8)
     column, row = _cells(soup.corners[chosen].mean(axis=1))
     cells = np.zeros((rows, columns, side, side, 3), np.uint8)
-    # Free cells look like the last one, so that coarse levels of the image have no dark rims.
+    # Free cells look like the last one: coarse levels of the image have no dark rims.
     last = int(np.argmax(_interleave((column, row))))
     cells[:] = encoded[last].reshape(side, side, 3)
     cells[row, column] = encoded.reshape(count, side, side, 3)

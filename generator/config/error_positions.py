@@ -42,10 +42,10 @@ def located_errors(document: yaml_tree.Node) -> Iterator[None]:
         if number is None:
             raise
         item, field = document.entries[key].items[number], parts.get("field") or ""
-        # A field with its default has no position of its own.
+        # A field with its default has no position.
         node = item.get(*field.split(".")) if field else None
         path = f"{key}[{number}].{field}" if field else f"{key}[{number}]"
-        # "elements.table.on" and "elements[2].on" are the same; "sensor 'left'" tells more.
+        # "elements.table.on" and "elements[2].on" are the same; "sensor 'left'" is more specific.
         fact = parts["fact"] if key == parts["list"] else str(error)
         problems.refuse((node or item).position, path, fact)
 

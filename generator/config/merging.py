@@ -64,7 +64,7 @@ def merge_named(base: Node, override: Node) -> Node:
     for item in override.content:
         name = node_name(item)
         if name in order:
-            # An item without a name keeps that of the inherited one, which it may replace.
+            # An item without a name keeps the inherited one's, which it may replace.
             named = item if item.get("name") else with_entry(item, "name", items[name].get("name"))
             items[name] = merge_nodes(items[name], named)
             at = order.index(name)

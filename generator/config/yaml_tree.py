@@ -359,7 +359,7 @@ class _Reader:
         target = self._anchors[event.anchor]
         if target is None:
             self._abort(where, f"alias *{name} is inside the node it refers to")
-        # Aliases of aliases grow exponentially, so what they stand for counts, not their number.
+        # Aliases of aliases grow exponentially: their contents count, not their number.
         levels, count = _extent(target)
         self._aliased += count
         if self._aliased > MAX_ALIASED_NODES:

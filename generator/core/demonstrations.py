@@ -93,5 +93,5 @@ def _end_s(episode: scene.Episode) -> float:
 
 
 def _spans_at(spans: Sequence[AnySpan], time_s: float) -> list[AnySpan]:
-    # Times of steps are sums of floats: a span begins a little earlier than it says.
+    # Times of steps are sums of floats: a span begins a little earlier than stated.
     return [s for s in spans if s.start_s - 1e-6 <= time_s < s.end_s - 1e-6]

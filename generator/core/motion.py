@@ -149,7 +149,7 @@ class Trajectory:
     def _place(self, time_s: float) -> tuple[int, float]:
         """Index of the knot before an instant, and the elapsed share of the step in [0, 1]."""
         last = len(self.knots) - 2
-        # Rounded, so that instants summed in different ways give the same pose.
+        # Rounded: instants summed in different ways must give the same pose.
         steps = round((time_s - self.start_s) / self.step_s, 9)
         k = min(max(math.floor(steps), 0), last)
         return k, min(max(steps - k, 0.0), 1.0)

@@ -191,7 +191,7 @@ def ground_rectangle(plate: Plate) -> tuple[SE3, tuple[float, float]]:
     axes = [low[k] + (np.arange(_GRID) + 0.5) * steps[k] for k in range(2)]
     cells = is_inside(polygon, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
     first, end = _largest_rectangle(cells, float(steps[0]), float(steps[1]))
-    # A line through the middle of single cells is no area.
+    # A line through the middle of single cells is not an area.
     if min(end[0] - first[0], end[1] - first[1]) < _CELLS_MIN:
         raise ValueError("no rectangle fits into the ground")
     a, b = low + np.array(first) * steps, low + np.array(end) * steps

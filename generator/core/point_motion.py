@@ -56,7 +56,7 @@ def moved_points(
             p_body = _to_body(now, one, p_world[rows], delays_s[rows])
             found[rows] = _to_world(now, then, one, p_body, delays_s[rows])
             continue
-        # What has no instance stays, unless it is on the mesh of something that moves.
+        # Points without an instance stay, unless they are on the mesh of a moving body.
         for reach_m in REACHES_M if number else REACHES_M[:2]:
             p_then, on_mesh = _on_nearest(
                 now, then, assets, [one, *others], p_world[rows], delays_s[rows], reach_m

@@ -110,7 +110,7 @@ def _has_death_signal() -> bool:
 
 
 def _is_parent(pid: int) -> bool:
-    # Windows keeps the number of a parent that has ended; opening its handle tells.
+    # Windows keeps the number of a parent that has ended; opening its handle reveals the end.
     return os.getppid() == pid and (not hasattr(os, "startfile") or _is_running(pid))
 
 
@@ -145,7 +145,7 @@ def _main(pid: int, arguments: list[str]) -> None:
     end = arguments.index("--")
     command = arguments[end + 1 :]
     for variable in arguments[:end]:
-        # What runs next inherits the variables of the C library.
+        # The next program inherits the variables of the C library.
         os.putenv(*variable.split("=", 1))
     if not _has_death_signal():
         sys.exit(_run_tied(pid, command))

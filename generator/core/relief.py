@@ -129,7 +129,7 @@ class RoadProfile:
     def _inside_m(self) -> tuple[float, float]:
         """Distances from the line between which the land inside its sharpest bend is blended."""
         sharpest = max(abs(self.curvature_per_m + k) for _, _, _, k, _ in self._turns())
-        # Next to the road, its own profile decides even in bends that are hardly wider.
+        # Next to the road, its own profile decides even in bends that are only slightly wider.
         first = max(_INSIDE[0] / sharpest, self.half_width_m)
         return first, max(_INSIDE[1] / sharpest, first + CELL_M)
 
@@ -217,7 +217,7 @@ class Relief:
         corners, u, v = grid.find(points_m)
         here, north_z, east_z, cross_z = (grid.heights_m.take(corner) for corner in corners)
         east, north, cross = east_z - here, north_z - here, cross_z - here
-        # The diagonal of a cell runs from its corner of least to that of largest x and y.
+        # The diagonal of a cell runs from its corner of least x and y to its opposite corner.
         lower: Array = u * east + v * (cross - east)
         upper: Array = v * north + u * (cross - north)
         heights: Array = here + np.where(u >= v, lower, upper)

@@ -122,7 +122,7 @@ def _fields_of(kind: type) -> Callable[[Any], Iterable[tuple[str, Any]]] | None:
 def _builder(kind: Any) -> Callable[[Any], Any]:
     """Function that builds values of an annotation from plain ones; compiled once."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    # ``NDArray`` is an alias type (PEP 695) from NumPy 2.5 on: what it stands for is one step away.
+    # ``NDArray`` is an alias type (PEP 695) from NumPy 2.5 on: its value is one step away.
     origin = typing.get_origin(getattr(origin, "__value__", kind))
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
         return _dataclass_builder(kind)
@@ -160,7 +160,7 @@ def _dataclass_builder(kind: type) -> Callable[[Any], Any]:
 
 @cache
 def _field_builders(kind: type) -> dict[str, Callable[[Any], Any]]:
-    # Types may refer to themselves, so that fields are looked at when the first value comes.
+    # Types may refer to themselves: fields are looked at when the first value comes.
     return {name: _builder(hint) for name, hint in typing.get_type_hints(kind).items()}
 
 
@@ -183,7 +183,7 @@ def _floats(count: int, plain: Sequence[float]) -> tuple[float, ...]:
 
 def _mapping_builder(key: Any, value: Any) -> Callable[[Any], Any]:
     build = _builder(value)
-    # JSON knows no other keys than strings.
+    # JSON has no other keys than strings.
     return lambda plain: {key(name): build(item) for name, item in plain.items()}
 
 

@@ -44,8 +44,8 @@ def keep_freed_memory() -> None:
 
     By default, glibc unmaps arrays of 128 kB and more when they are freed and trims the heap; every
     temporary image then costs one page fault per 4 kB. ``malloc_trim`` still returns everything.
-    The two limits, on the size of arrays on the heap and on free memory at its end, are as large as
-    glibc allows. Other C libraries have no such settings.
+    The two sizes limit arrays on the heap, as far as glibc allows, and the free memory at its end.
+    Other C libraries have no such settings.
     """
     with suppress(AttributeError, OSError, TypeError):
         libc = ctypes.CDLL(None)

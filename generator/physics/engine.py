@@ -122,7 +122,7 @@ class Engine:
         for body in _solids(scene):
             self._add(body, body in falling, joints.get(body.name))
         for name in joints:
-            # What is fixed does not stop a part that moves: the limits of its joint do.
+            # Fixed bodies do not stop a part that moves: the limits of its joint do.
             self._world.ignore(name, [other for other in fixed if other != name])
         return joints
 

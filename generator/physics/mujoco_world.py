@@ -346,7 +346,7 @@ def _add_body(
         "friction": (friction**2, rolling_m, rolling_m),
         # A cone without sliding friction has rolling friction only, and diverges.
         "condim": 1 if solid.is_smooth else dimensions,
-        # What is smooth stays smooth in contact with anything.
+        # Smooth bodies stay smooth in contact with any other.
         "priority": int(friction == 0.0),
         "solref": (2.0 * time_step_s, 1.0),
         "solimp": _SOLIMP,

@@ -47,7 +47,7 @@ class Settling:
         self._world = world
         self._config = config
         self._surfaces = surfaces
-        # Lowest first, so that each is lowered onto those below it; the sort is stable.
+        # Lowest first: each is lowered onto the ones below it; the sort is stable.
         self._falling = sorted(falling, key=lambda body: float(world.bounds_m(body.name)[0][2]))
         self._homes = {
             body.name: home_surface(surfaces[body.name], *world.bounds_m(body.name))

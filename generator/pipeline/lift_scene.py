@@ -392,7 +392,7 @@ def _lifted_light(light: Light, moves: Mapping[str, SE3], relief: Relief) -> Lig
         return scene_time.moved_light(light, moves[light.body])
     pose = SE3(light.position_m)
     if light.cutoff:
-        # A headlight without a body: that of the car that carries the camera.
+        # A headlight without a body belongs to the car that carries the camera.
         yaw_rad = math.atan2(light.direction[1], light.direction[0])
         return scene_time.moved_light(light, _ridden(pose, yaw_rad, relief))
     return scene_time.moved_light(light, _rise(pose, relief))

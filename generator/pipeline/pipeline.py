@@ -137,7 +137,7 @@ class Pipeline:
     def __enter__(self) -> "Pipeline":
         """Start the engines."""
         engine = self._open_physics()
-        # Open the renderer now, so that a machine that cannot render fails early.
+        # Open the renderer now: a machine that cannot render fails early.
         _ = self.renderer
         self._physics = self._resources.enter_context(engine)
         return self

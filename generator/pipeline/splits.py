@@ -119,7 +119,7 @@ def _turns(shares: tuple[tuple[str, float], ...], count: int) -> tuple[str, ...]
     made = dict.fromkeys((name for name, _ in shares), 0)
     turns = []
     for number in range(1, count + 1):
-        # Rounded, so that equal shares tie despite floating-point errors; the first one wins.
+        # Rounded: equal shares tie despite floating-point errors; the first one wins.
         behind = {name: round(share * number - made[name], 9) for name, share in shares}
         name = max(behind, key=lambda split: behind[split])
         made[name] += 1

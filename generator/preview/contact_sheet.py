@@ -73,7 +73,7 @@ def make_tiles(
                     yield from _channel_tiles(caption, reading, channel)
         for name, cloud in sorted(sample.capture.clouds.items()):
             if cloud.lidar.model == pseudo_lidar.MODEL:
-                # The depth image of its camera says the same.
+                # The depth image of its camera has the same contents.
                 continue
             yield Tile(name, top_view(cloud, sample.scene, aspect))
             yield Tile(f"{name} range, intensity, class", range_view(cloud))

@@ -73,7 +73,7 @@ def draw_labels(
         if "keypoints" in layers:
             draw_keypoints(image, item.keypoints or (), _lighter(color))
     places: list[boxes.BoxPx] = []
-    # Names of things first: those of their surroundings make room.
+    # Names of objects first: names of their surroundings make room.
     for item in (*things, *around) if "names" in layers else ():
         if item.box is not None:
             _write(image, item, unit, places)
@@ -250,7 +250,7 @@ def _tint(image: Image, item: sample.ObjectTruth) -> None:
 def _outline(image: Image, item: sample.ObjectTruth, width: int) -> None:
     if item.mask is None:
         return
-    # Zeros around it: what is outside the mask's box is outside the mask.
+    # Zeros around it: pixels outside the mask's box are outside the mask.
     mask = np.pad(item.mask.pixels.astype(np.uint8), width)
     inner = cv2.erode(mask, np.ones((2 * width + 1, 2 * width + 1), np.uint8))
     edge = (mask > inner)[width:-width, width:-width]

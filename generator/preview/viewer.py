@@ -66,7 +66,7 @@ def serve_web(host: str) -> Viewer:
     process = subprocess.Popen(processes.tie(command), stdout=subprocess.DEVNULL)
     _wait_until_listening(process, host, port)
     _wait_until_listening(process, host, web_port)
-    # A wildcard is no address to connect to.
+    # A wildcard is not an address to connect to.
     reachable = LOOPBACK if host == "0.0.0.0" else host
     stream_url = _stream_url(reachable, port)
     page = f"http://{reachable}:{web_port}/?url={quote(stream_url, safe='')}"

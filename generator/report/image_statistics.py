@@ -95,7 +95,7 @@ def measure_look(grey: NDArray[np.uint8]) -> Look:
 
 
 def group_duplicates(files: Sequence[ImageFile], hashes: Sequence[int]) -> list[DuplicateGroup]:
-    """Groups of near-duplicates from at least two scenes, in falling order of images.
+    """Groups of near-duplicates from at least two scenes, largest first.
 
     Views and instants of one scene look alike by design and make no group by themselves.
     """

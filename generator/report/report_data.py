@@ -443,6 +443,6 @@ def read_licences(path: Path) -> list[Json]:
         if line.startswith("| ")
     ]
     keys = ("source", "licence", "author", "assets")
-    # Only the last column may hold a separator of its own.
+    # Only the last column may hold the separator.
     cells = ([*row[:3], " | ".join(row[3:])] for row in rows[1:])
     return [dict(zip(keys, row, strict=False)) for row in cells]

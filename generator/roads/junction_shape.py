@@ -304,7 +304,7 @@ def corner_lanes(
         for kind, offset_m, width_m in beside if shape.sidewalk_m > 0.0 else ():
             set_back = kind == "frontage" and shape.setback_m > 0.0
             if set_back and not shape.is_straight(number):
-                # The fronts of the arms' houses meet in a corner of their own.
+                # The fronts of the arms' houses meet in a separate corner.
                 continue
             line = corner(shape, number, offset_m + (shape.setback_m if set_back else 0.0))
             sloping_m = min(offset_m, shape.border_m) - KERB_WIDTH_M

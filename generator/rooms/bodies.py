@@ -105,7 +105,7 @@ def find_splashback(room: Room, wall: int, pieces: Sequence[layout.Piece]) -> tu
             and round(piece.yaw_rad / (0.5 * math.pi)) % 4 == wall
         ):
             px, py, *_, half = piece.footprint
-            # The wall's own X axis runs to the right of what faces into the room.
+            # The wall's X axis runs to the right as seen facing into the room.
             right = (px - x) * s - (py - y) * c
             spans.append((right - half, right + half))
     if not spans:
@@ -269,7 +269,7 @@ class Builder:
         looks: Looks,
         splashback: tuple[float, ...],
     ) -> None:
-        # A wall's own X axis runs to the right of what faces into the room.
+        # A wall's X axis runs to the right as seen facing into the room.
         holes = [v for o in openings for v in (-o.along_m, o.width_m, o.low_m, o.high_m)]
         length = round(room.wall_length_m(wall) + 2 * WALL_M * (wall % 2), 4)
         parameters: dict[str, ParameterValue] = {"size_m": (length, room.size_m[2], WALL_M)}

@@ -99,7 +99,7 @@ def find_interreflection(
     direct = [_direct(room, p, lights) for room, p in zip(rooms, patches, strict=True)]
     received = [np.zeros_like(d) for d in direct]
     for _ in range(_BOUNCES):
-        # What comes through doors is seen as direct light already where a lamp shines through.
+        # Light through doors is seen as direct light already where a lamp shines through.
         sent = [
             wall * (d + r) + _through_doors(room, c, received, cover, patches)
             for room, wall, d, r, c in zip(rooms, walls, direct, received, cover, strict=True)

@@ -114,7 +114,7 @@ class Shape:
     rest: Quaternion | None
 
 
-# A room asks a hundred thousand times for the facts of a few dozen families.
+# A room looks up the facts of a few dozen families a hundred thousand times.
 @lru_cache(maxsize=1024)
 def is_flat(family: str) -> bool:
     """Whether pieces of a family lie on the floor and others stand on them."""
@@ -229,7 +229,7 @@ class Layout:
         footprint: Rectangle = (at[0], at[1], c, sn, s.half_x, s.half_y)
         high_m = low_m + s.high - s.low
         zone = _before(footprint, rule.clearance_m) if rule.clearance_m > 0.0 else None
-        # With what it will carry.
+        # Including its load.
         top_m = high_m + _free_above_m(family)
         reason = self.refuse(footprint, low_m, high_m, zone, near, flat=is_flat(family))
         if not reason and self.meets_sill(footprint, low_m, top_m):

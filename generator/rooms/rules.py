@@ -29,7 +29,7 @@ class Rule:
         middle_m: Height of its middle, instead of ``height_m`` [m].
         at: Place on the top that carries it, from -1 to 1 along depth and width.
         matching: Whether all matching pieces of a room have one look.
-        optional: Whether a room may do without it, despite ``count``.
+        optional: Whether a room may do without it, whatever its ``count``.
         movable: Whether a person moves it out of the way.
         clutter: Whether ``clutter`` of the randomizer scales its number.
         things: Families of small objects on it.

@@ -52,7 +52,7 @@ def _lax_json(stored: StoredSamples, shard: int) -> Iterator[verify.Finding]:
         path = stored.shard_dir(shard) / name
         lines = path.read_bytes().splitlines() if path.is_file() else []
         for number, line in enumerate(lines, 1):
-            # Most lines have neither word, so that they need not be parsed once more.
+            # Most lines have neither word, and need not be parsed once more.
             if b"NaN" not in line and b"Infinity" not in line:
                 continue
             try:

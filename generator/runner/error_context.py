@@ -25,7 +25,7 @@ def explain_errors(place: str, command: str = "") -> Iterator[None]:
         reproduce = f"\n  Reproduce: {command}" if command else ""
         raise SampleError(f"{place}: {error}{reproduce}") from error
     except (Exception, KeyboardInterrupt, SystemExit) as error:
-        # Requests to stop are Interrupted, so that the last two come from a plug-in.
+        # Requests to stop are Interrupted: the last two come from a plug-in.
         raise unexpected_error(error, place, command) from error
 
 

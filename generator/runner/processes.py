@@ -180,7 +180,7 @@ class WorkerPool:
         some_end = len(connections) < len(self._children)
         wait([wake, *connections], ENDING_TICK_S if some_end else timeout_s)
         for number, child in sorted(self._children.items()):
-            # Poll first, so that messages before the end are not lost.
+            # Poll first: messages before the end must not be lost.
             exit_code = child.process.poll()
             yield from child.messages()
             if exit_code is not None:

@@ -30,7 +30,7 @@ def read_declared_plan(store: LocalStore) -> bytes | None:
 
 
 def restore_plan(store: LocalStore, plan: Plan) -> None:
-    """Replace a damaged or missing ``plan.json`` by ``plan``, if it was the same.
+    """Replace a damaged or missing ``plan.json`` by ``plan``, if the sums confirm it.
 
     Changes nothing if the folder is not a data set of this plan: the run then raises the error.
 

@@ -267,7 +267,7 @@ class LocalStore:
             self._clear_places()
             path, copy = self.root / PLAN_NAME, self.run_dir / PLAN_NAME
             if not path.exists() or path.read_bytes() != plan_bytes(plan):
-                # Sums of fewer samples would not be those of this plan.
+                # Sums of fewer samples would not belong to this plan.
                 (self.root / SUMS_NAME).unlink(missing_ok=True)
             # The copy first: repair takes it for the plan when the two differ.
             for kept in (copy, path):
@@ -276,7 +276,7 @@ class LocalStore:
             make_folder(self._shards_dir)
             if self.manifest_path.exists():
                 self.manifest_path.unlink()
-                # What was certified is no more.
+                # The certified data set no longer exists.
                 for name in CERTIFICATE_NAMES:
                     (self.root / name).unlink(missing_ok=True)
                 sync_path(self.root)

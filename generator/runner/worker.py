@@ -47,7 +47,7 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
         parent_pid: Process whose end also ends this one.
     """
     end_with_parent(parent_pid)
-    # What imports and opening engines make is kept, and never searched for garbage, which is a
+    # Objects made by imports and engines are kept, and never searched for garbage, which is a
     # hundredth of it: searching it takes a tenth of the start, again and again.
     gc.disable()
     ignore_interrupts()

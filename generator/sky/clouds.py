@@ -51,7 +51,7 @@ def cloud_layer(
     for k, level in enumerate(levels):
         near = np.clip(1.0 - np.abs(level_of_row - k), 0.0, 1.0)
         shown = np.flatnonzero((near > 0.0) & (up > 0.0))
-        # Strip by strip, so that intermediate arrays stay in the processor's caches.
+        # Strip by strip: intermediate arrays stay in the processor's caches.
         for first in range(0, len(shown), _STRIP_ROWS):
             rows = shown[first : first + _STRIP_ROWS]
             flat_m = _HEIGHT_M / (up[rows, None, None] + _HEAPING)

@@ -32,7 +32,7 @@ _TWILIGHT = ((-0.8, (2.88, 22.26, -207.64, 1034.30)), (-5.0, (2.88, 21.81, -258.
 _SUNSET_DEG = -0.8
 # Of a city's sky without moon; clouds throw ten times as much light back (Kyba et al. 2011).
 _NIGHT_LUX, _NIGHT_OVERCAST_LUX = 0.03, 0.3
-# What the sun's colour is computed at [um], and its colour outside the atmosphere.
+# Wavelengths of the sun's colour [um], and its colour outside the atmosphere.
 _WAVELENGTHS_UM = (0.610, 0.550, 0.465)
 _SOLAR_COLOR = (1.07, 0.985, 0.90)
 # 0.35 cm of ozone, which takes 0.1 per cm at 555 nm (Preetham 1999, A.1).

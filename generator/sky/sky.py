@@ -34,7 +34,7 @@ _STRIP_ROWS = 16
 # Less light than this share of the rest is not computed.
 _NEGLIGIBLE = 1e-3
 # CIE S 011/E:2003, types 12 (clear) and 13 (clear, polluted): a to e. The turbidity of the
-# latter is assumed; the former is that of daylight.CLEAR_TURBIDITY.
+# latter is assumed; the former is daylight.CLEAR_TURBIDITY.
 _CLEAR, _POLLUTED = (-1.0, -0.32, 10.0, -3.0, 0.45), (-1.0, -0.32, 16.0, -3.0, 0.30)
 _POLLUTED_TURBIDITY = 6.0
 _TABLES = load_table(__package__, "preetham", tuple[tuple[float, ...], ...])
@@ -150,7 +150,7 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
         (1.0 - hazy) * clear + hazy * polluted
         for clear, polluted in zip(_CLEAR, _POLLUTED, strict=True)
     )
-    # The standard's indicatrix is Perez' less a constant, so that it is 1 at a right angle.
+    # The standard's indicatrix is Perez' less a constant, which makes it 1 at a right angle.
     at_right_angle = 1.0 - c * math.exp(falloff * math.pi / 2.0)
     luminance = angles.relative((a, b, c, falloff, e), at_right_angle)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
@@ -178,7 +178,8 @@ class _SkyAngles:
 
     Attributes:
         up: Height of each row, its sine; at least 0.012, since they diverge at the horizon. [h, 1].
-        angle_rad, cosine_squared: Of the angle between each direction and the sun. [h, w].
+        angle_rad, cosine_squared: Angle between each direction and the sun, its cosine squared, [h,
+            w].
         sun_zenith_rad: Distance of the sun from the zenith.
     """
 

@@ -130,7 +130,7 @@ class Pedestrians:
         k = np.minimum(((self.at_m + AHEAD_M) / GRID_M).astype(np.int64), self._lines.shape[1] - 3)
         along = normalize(self._lines[rows, k + 1, :2] - self._lines[rows, k, :2])
         target = self._lines[rows, k, :2] + self.off_m[:, None] * _left_normals(along)
-        # Interpolate between grid points, so that the walk is smooth.
+        # Interpolate between grid points, for a smooth walk.
         target += (self.at_m + AHEAD_M - GRID_M * k)[:, None] * along
         to = target - self.xy_m
         away = np.sqrt(to[:, 0] * to[:, 0] + to[:, 1] * to[:, 1])

@@ -76,7 +76,7 @@ def follow_lines(
         curvature[:, k] = bend
         if k + 1 == m:
             break
-        # Advance until the axle is beside the line's next station.
+        # Advance until the axle is next to the line's next station.
         t, ahead_of = tangents[:, k + 1], lines_m[:, k + 1] - p
         along = np.maximum(h[:, 0] * t[:, 0] + h[:, 1] * t[:, 1], 0.3)
         step = np.maximum((ahead_of[:, 0] * t[:, 0] + ahead_of[:, 1] * t[:, 1]) / along, 0.0)

@@ -44,7 +44,7 @@ def primitive_corners(prim: Any, place: str) -> se3.Array:
         top = radius if kind == "Cylinder" else 0.0
         corners = _revolve([(0.0, -half), (radius, -half), (top, half), (0.0, half)])
     axis = prim.GetAttribute("axis").Get() if kind not in ("Cube", "Sphere") else "Z"
-    # Cyclic, so that shapes keep their winding.
+    # Cyclic: shapes keep their winding.
     return np.asarray(np.roll(corners, {"Z": 0, "X": 1, "Y": 2}[str(axis)], axis=2))
 
 

@@ -42,7 +42,7 @@ def measure_mask(mask: Mapping[str, Any]) -> tuple[tuple[int, int, int, int] | N
     from pycocotools import mask as coco_mask
 
     height, width = mask["pixels"]["size"]
-    # COCO's runs go down the columns, ours along the rows: those of the transposed mask.
+    # COCO's runs go down the columns, gen-data's along the rows: runs of the transposed mask.
     runs = {"size": [width, height], "counts": mask["pixels"]["runs"]}
     encoded = coco_mask.frPyObjects(runs, width, height)
     area = int(coco_mask.area(encoded))

@@ -62,14 +62,14 @@ def _compare(examined: Examined, sample: Sample, name: str, agreement: Agreement
     time_s, relative_tolerance = reading.time_s, RELATIVE_TOLERANCE
     if camera.shutter.rolls and sample.scene.tracks and len(v):
         relative_tolerance = ROLLING_TOLERANCE
-        # Every row has an instant of its own: one row costs one world.
+        # Every row has a separate instant: one row costs one world.
         row = v[int(rng.integers(0, len(v)))]
         u, v = u[v == row], v[v == row]
         time_s += float(camera.shutter.delay_s(row + 0.5, intrinsics.height_px))
     chosen = np.sort(rng.permutation(len(u))[: examined.scope.rays])
     u, v = u[chosen], v[chosen]
     directions = intrinsics.rays(np.stack([u, v], axis=1).astype(np.float64) + 0.5)
-    # Nothing is known of pixels outside the lens's field, and of depths beside the camera.
+    # Pixels outside the lens's field, and depths at the side of the camera, are unknown.
     inside = np.isfinite(directions).all(axis=1)
     if stored is Channel.Z_DEPTH:
         inside &= np.nan_to_num(directions[:, 2]) > 1e-3
@@ -138,5 +138,5 @@ def state_distances(
     vacant = np.isinf(distance)
     tolerance = 0.51 * scale_m / per_ray + relative_tolerance * np.where(vacant, 0.0, distance)
     reach = (DEPTH_UNITS_MAX - 0.5) * scale_m / per_ray
-    # Beyond the reach of the file there may be a thing, at an unknown distance.
+    # Beyond the reach of the file there may be an object, at an unknown distance.
     return Seen(distance, tolerance, np.where(vacant, UNSTATED, ids), reach)

@@ -24,7 +24,7 @@ def check_written_again(examined: Examined) -> Iterator[Finding]:
         return
     stored, config = examined.stored, examined.config
     store = LocalStore(stored.folder)
-    # On the same file system, so that images can be linked.
+    # On the same file system, for images to be linked.
     durable_files.make_folder(store.scratch_root)
     scratch = store.scratch_dir()
     try:

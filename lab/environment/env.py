@@ -225,7 +225,7 @@ def make_vec(config: ConfigLike, n: int, **options: Any) -> gymnasium.vector.Asy
     """
     if n < 1:
         raise ConfigError(f"n: {n} environments; expected at least 1")
-    # Processes that begin anew inherit no threads and no engine of this one.
+    # Spawned processes inherit no threads and no engine of this one.
     return gymnasium.vector.AsyncVectorEnv([partial(Env, config, **options)] * n, context="spawn")
 
 

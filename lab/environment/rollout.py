@@ -75,7 +75,7 @@ class Rollout:
         )
         self.simulation.advance(due.positions, due.opening, self._substeps)
         if self.simulation.is_blocked:
-            # Else later motions would first have to undo what the obstacle prevented.
+            # Else later motions would first have to undo the prevented one.
             here = tuple(self.simulation.positions.tolist())
             self._commanded = replace(self._commanded, positions=here)
         self.scene = self._observed()

@@ -29,7 +29,7 @@ class MeasuredPhoto:
     """Statistics of one photograph.
 
     Attributes:
-        name, size_px: Of the photograph.
+        name, size_px: Name and size of the photograph.
         statistics: In the order of ``CAMERA``.
         descriptions: In the order of ``descriptions.PICTURES``.
         jpeg_quality: NaN = no compression found.

@@ -277,7 +277,7 @@ def solve(
         steep = derivatives(locate(place)) * plausible / error[:, None]
         return np.vstack([steep, np.eye(len(axes))])
 
-    # In plausible deviations, so that no parameter's unit decides when the search has converged;
+    # In plausible deviations: no parameter's unit decides when the search has converged;
     # from 1 and not 0, as the first trust region has the size of the first place.
     search = least_squares(
         residuals, place(begin), jacobian, (place(low), place(high)),

@@ -48,7 +48,7 @@ class ImageLabels:
     """Boxes in one image.
 
     Attributes:
-        width_px, height_px: Of the image.
+        width_px, height_px: Width and height of the image.
     """
 
     width_px: int

@@ -61,7 +61,7 @@ def worst_pictures(runs: Sequence[evaluation.Evaluation], most: int) -> list[tup
 def draw_faults(run: evaluation.Evaluation, number: int) -> NDArray[np.uint8]:
     """A picture with the objects that were found and missed, and the false alarms; RGB."""
     image = real_pictures.read_image(run.pictures[number].path)
-    # Small pictures are enlarged: lines must not hide what they mark.
+    # Small pictures are enlarged: lines must not hide the marked objects.
     scale = SHOWN_PX / max(image.shape[:2])
     filter_ = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
     shown = cv2.resize(image, None, fx=scale, fy=scale, interpolation=filter_)

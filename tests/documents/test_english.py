@@ -20,7 +20,7 @@ FOLDERS = (
     *("annotations", "api", "assemble", "assets", "cli", "config", "core", "physics", "pipeline"),
     *("packs", "preview", "report", "roads", "rooms", "runner", "sensors", "sky", "traffic", "usd"),
 )
-LABORATORY = ("certificate", "environment", "matching", "study", "write")
+LABORATORY = ("carry_over", "certificate", "environment", "matching", "study", "write")
 SOURCES = (
     *(f"generator/{folder}/**/*.py" for folder in FOLDERS),
     *(f"lab/{folder}/**/*.py" for folder in LABORATORY),
@@ -37,13 +37,14 @@ TICS = {
     "of its own": r"\bof (?:its|their|his|one's|our) own\b|\b(?:of|by) ours\b",
     "rare adverbs": r"\b(?:anew|likewise|hardly|beside)\b",
     "is no": r"(?<!there )\b(?:is|are) no (?!longer\b|more\b|less\b)",
-    "attribute that begins with Of": r"^ +\w+: Of\b",
+    "attribute that begins with Of": r"^ +(?:\w+, )*\w+: Of\b",
 }
 """Patterns by name, without regard to capitals."""
 TIC = re.compile("|".join(f"(?:{tic})" for tic in TICS.values()), re.IGNORECASE | re.MULTILINE)
 CODE = re.compile(r"^```.*?^```$|``[^`\n]+``|`[^`\n]*`|\]\([^)\s]*\)", re.MULTILINE | re.DOTALL)
 PATH = re.compile(r"[\w.:]+")
 """Keys, and names of modules and their objects."""
+COMMENT = re.compile(r"^[^\"']*# (.*)", re.MULTILINE)
 NAME = re.compile(r"(?<=^        )\w+(?=: )", re.MULTILINE)
 """Names of parameters and attributes in docstrings."""
 
@@ -59,7 +60,7 @@ def name_of(path: Path) -> str:
 
 
 def prose(path: Path) -> str:
-    """Text of a document, or all strings of a module (docstrings, messages), without code."""
+    """Text of a document, or all strings and comments of a module, without code."""
     text = path.read_text("utf-8")
     if path.suffix == ".md":
         return CODE.sub("", text)
@@ -68,8 +69,8 @@ def prose(path: Path) -> str:
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Constant) and type(node.value) is str
     )
-    texts = "\n".join(text for text in strings if not PATH.fullmatch(text))
-    return NAME.sub("name", CODE.sub("", texts))
+    texts = (one for one in strings if not PATH.fullmatch(one))
+    return NAME.sub("name", CODE.sub("", "\n".join([*texts, *COMMENT.findall(text)])))
 
 
 def tics(text: str) -> Counter[str]:

@@ -56,7 +56,7 @@ def _continue(plate: Plate, rgb: asset_types.UInt8, polar: Array, azimuth: Array
     )
     seen = plate.T_world_camera.inverse().rotate(directions)
     depth = np.maximum(seen[..., 2], 0.05)
-    # Beside the field of view, only the border counts: up or down.
+    # Outside the field of view, only the border counts: up or down.
     rows = np.where(
         seen[..., 2] > 0.05,
         0.5 * height_px + plate.focal_px * seen[..., 1] / depth,

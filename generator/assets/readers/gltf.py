@@ -51,7 +51,7 @@ class _Placement:
 
     Attributes:
         set_index: Number of the set of texture coordinates.
-        offset, rotation, scale: Of KHR_texture_transform.
+        offset, rotation, scale: Values of KHR_texture_transform.
     """
 
     set_index: int = 0

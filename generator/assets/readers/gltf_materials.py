@@ -53,7 +53,7 @@ def gltf_material(
     unused = tuple(f"{key} {_UNUSED[key]}" for key in sorted(further) if key in _UNUSED)
     *color, alpha = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
     passed, transmitted = _read_diffuse_transmission(further, pbr, images)
-    # What a thin sheet transmits is missing in its reflection.
+    # Light that a thin sheet transmits is missing in its reflection.
     red, green, blue = (fraction(c, "baseColorFactor") * (1.0 - passed) for c in color)
     surface = _image_name(pbr, "metallicRoughnessTexture", images)
     roughness, roughness_map = _read_channel(pbr, "roughnessFactor", surface, 1, images)
@@ -129,7 +129,7 @@ def _specular_glossiness(glossy: Mapping[str, Any], images: Images) -> dict[str,
         "roughnessFactor": round(1.0 - gloss, 4),
     }
     if metallic > 0.5:
-        # A metal: its colour is that of its reflection.
+        # A metal: it has the colour of its reflection.
         return {**described, "baseColorFactor": [*specular, diffuse[3]], "metallicFactor": 1.0}
     if "diffuseTexture" in glossy:
         described["baseColorTexture"] = glossy["diffuseTexture"]

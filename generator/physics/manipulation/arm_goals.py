@@ -114,7 +114,7 @@ class Arm:
             if not self._collides(obstacles, goal.grasped_object):
                 return candidate
             failures.add(Failure.COLLIDES)
-        # The candidate that got farthest says most about what to change.
+        # The candidate that got farthest shows best how to change the goal.
         return self._reject(next(f for f in Failure if f in failures), goal)
 
     def _candidates(self, goal: scene.ArmGoal) -> Iterator[ArmState | Failure]:

@@ -89,7 +89,7 @@ def _carry_out(
     by_name = {planner.arm.articulation.name: planner for planner in planners}
     goals, failure = articulation.task, assignment.failure
     grasp = next((k for k, goal in enumerate(goals) if goal.kind == "grasp"), -1)
-    ahead = failure  # What is still to happen.
+    ahead = failure  # Failures still to happen.
     number = 0
     while number < len(goals):
         goal = goals[number]
@@ -115,7 +115,7 @@ def _carry_out(
         planned = _plan(at_work, goal, number + 1, missed)
         if isinstance(planned, errors.Rejection):
             if ahead == "wrong_object" and number > grasp:
-                break  # What is in a wrong place may be out of reach: the arm gives up.
+                break  # A misplaced body may be out of reach: the arm gives up.
             return planned
         shown.run(planned, goal.phase or goal.kind)
         number += 1
@@ -151,7 +151,7 @@ def _mishap(
     number: int,
     shown: "Demonstration",
 ) -> errors.Rejection | None:
-    """Precede the first grasp: by a blow, or another body in the hand, which it may put back."""
+    """Fail before the first grasp: by a blow, or with a wrong body, which it may put back."""
     if assignment.failure == "collision":
         steps: list[tuple[scene.ArmGoal | None, str]] = [(None, "approach")]
     else:

@@ -220,7 +220,7 @@ def _error(target: SE3, pose: SE3) -> Row:
 
 
 def _is_reached(error: Row, share: float) -> bool:
-    # Half the tolerance, so that rounding the positions cannot leave it.
+    # Half the tolerance: rounding the positions cannot leave it.
     distance = math.sqrt(sum(e * e for e in error[:3]))
     angle = math.sqrt(sum(e * e for e in error[3:])) / _LENGTH_M_PER_RAD
     half = 0.5 * share

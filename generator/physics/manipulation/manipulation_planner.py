@@ -245,7 +245,7 @@ class TaskPlanner:
             return self._reject([], CANNOT_REACH, number)
         via = tuple(way[:-1])
         leg = Leg(self.positions, way[-1], held=self._held, via=via, pivots=goal.pivots)
-        # How far a thing that pivots has turned on the way, physics will tell.
+        # Physics decides how far a body that pivots has turned on the way.
         checked = None if goal.pivots else self._held
         # Arms that move together keep their distance.
         partners = tuple(f"{arm}/" for arm in goal.arms)

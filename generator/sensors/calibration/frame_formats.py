@@ -215,7 +215,7 @@ def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) ->
     lens = camera_formats.lens_of("brown_conrady", calibration.numbers(D, [5], "D"), D, "D")
     rows = np.array(calibration.numbers(R, [9], "R")).reshape(3, 3)
     calibration.check_rotation(rows, R, "R")
-    # Points of camera 0 are mapped to those of the camera.
+    # Points of camera 0 are mapped to points of the camera.
     pose = SE3.from_matrix(np.column_stack([rows, calibration.numbers(T, [3], "T")])).inverse()
     keys = {f"{name}_0{number}" for name in "SKDRT"}
     camera = calibration.CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size)  # type: ignore[arg-type]

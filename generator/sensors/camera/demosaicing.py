@@ -50,7 +50,7 @@ def _fill_green(sites: Float32, padded: Float32) -> None:
     for top in range(0, height, _ROWS_AT_ONCE):
         n = min(_ROWS_AT_ONCE, height - top)
         around = padded[2 * top : 2 * (top + n + _REACH_PX)]
-        # Neighbours of the same colour, and of green beside and above.
+        # Neighbours of the same colour, and of green left, right, above and below.
         own, beside, above = (
             np.ascontiguousarray(around[y::2, x::2]) for y, x in ((0, 0), (2, 1), (1, 2))
         )

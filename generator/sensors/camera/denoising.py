@@ -21,7 +21,7 @@ _STEPS = 16.0
 """Integers per standard deviation: integer sums are the same on all processors."""
 _TEMPLATE_PX, _SEARCH_PX = 5, 9
 # Mean differences of patches with equal content are 1.13 standard deviations; demosaicing lowers
-# luma's to about 0.7, white balance and colour matrix raise those of chroma.
+# luma's to about 0.7, white balance and colour matrix raise chroma's.
 _LUMA, _CHROMA = 1.1, 2.2
 
 

@@ -261,7 +261,7 @@ def capture_photograph(
     if capture.Channel.RGB not in channels:
         return renderer.render(scene, camera, channels - developed)
     needed = (channels - developed) | {capture.Channel.RADIANCE}
-    # Points beside a wide lens have no depth along its axis: it is focused by range.
+    # Points at the side of a wide lens have no depth along its axis: it is focused by range.
     depth = capture.Channel.Z_DEPTH if camera.intrinsics.straight else capture.Channel.RANGE
     if pipeline.focus is not None:
         needed = needed | {depth}
@@ -347,7 +347,7 @@ def _metered(radiance: Float32, pipeline: ImagePipeline) -> float:
         low, high = reachable_ev100(pipeline.exposure_control)
     if pipeline.low_key == 0.0:
         return _meter(radiance, pipeline, (low, high))
-    # What is darker than the camera reaches is not darkened further.
+    # A scene darker than the camera's limit is not darkened further.
     ev100 = _meter(radiance, pipeline, (min(low, EV100_DARKEST), high))
     return min(max(ev100 + pipeline.low_key * dimming_ev(ev100), low), high)
 
@@ -432,7 +432,7 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
     warmth_ev = _draw(pipeline, "warmth_ev", shot.rng)
     if sensor.pattern != "mono":
         gains = isp.white_balance_gains(_illuminant(image, pipeline), share, warmth_ev)
-        # No gain is below 1, and the result is clipped: what saturates all channels stays white.
+        # No gain is below 1, and the result is clipped: fully saturated pixels stay white.
         gains = gains / gains.min()
     image = _read_sensor(np.maximum(image, 0.0), gains, sensor, shot)
     return Light(isp.transform_colors(image, srgb_from_camera), 1.0)
@@ -540,7 +540,7 @@ STAGES: tuple[Stage, ...] = (
 
 def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
     pipeline, scale = shot.pipeline, 1.0 / light.white
-    # On a grid, so that tables of bytes are used again.
+    # On a grid, to use tables of bytes again.
     contrast = round(_draw(shot.pipeline, "contrast", shot.rng) * CONTRASTS) / CONTRASTS
     amount = _draw(shot.pipeline, "sharpening", shot.rng)
     radius_px = pipeline.sharpening_px / pipeline.reduction

@@ -59,7 +59,8 @@ class KannalaBrandt(_LensModel):
     """A fisheye with OpenCV's model and names; all coefficients 0 is an equidistant lens.
 
     Attributes:
-        k1, k2, k3, k4: Of the third, fifth, seventh and ninth power of the angle to the axis.
+        k1, k2, k3, k4: Coefficients of the third, fifth, seventh and ninth power of the angle to
+            the axis.
         field_deg: Full field of view, outside which the image is black; null = the whole range in
             which the model is valid.
     """

@@ -91,7 +91,7 @@ def smooth_noise(rng: streams.Rng, shape: tuple[int, int], sigma_px: float) -> a
     """Gaussian noise of variance 1 with correlated neighbours, float32 [h, w]."""
     reach = int(np.ceil(3.0 * sigma_px))
     height, width = shape
-    # Drawn beyond the image, so that statistics are the same at its border.
+    # Drawn beyond the image, for the same statistics at its border.
     white = rng.standard_normal((height + 2 * reach, width + 2 * reach), dtype=np.float32)
     weights = cv2.getGaussianKernel(2 * reach + 1, sigma_px)
     weights = weights / np.sqrt(np.sum(weights**2))

@@ -204,7 +204,7 @@ def _add_secondary_hits(
         rivals = _relevant_hits(pulses, detours, model)
     order = rivals[np.argsort(detours.ray[rivals], kind="stable")]
     ray = detours.ray[order]
-    # The second hit of a ray, if it has two, goes into a slot of its own.
+    # The second hit of a ray, if it has two, goes into a separate slot.
     again = (np.diff(ray, prepend=-1) == 0).astype(np.int64)
     rows, place = np.unique(ray // rays, return_inverse=True)
     slot = rays * (1 + again) + ray % rays

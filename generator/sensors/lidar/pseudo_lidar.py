@@ -82,7 +82,7 @@ class PseudoLidar(Mounted):
         if camera.shutter.open_s > 0.0:
             # A cloud has a single pose: all its rays leave at one instant.
             camera = replace(camera, shutter=shutter.INSTANT)
-        # What most cameras have just rendered: a renderer returns it once more without work.
+        # Channels that most cameras have just rendered: a renderer returns them again without work.
         straight = camera.intrinsics.straight
         depth = Channel.Z_DEPTH if straight else Channel.RANGE
         wanted = (depth, Channel.INSTANCE, Channel.CATEGORY)

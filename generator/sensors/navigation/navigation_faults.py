@@ -47,7 +47,7 @@ class GnssFaults(SensorFaults):
         rows, jumps = fixes.rows.copy(), []
         times_s = rows["time_s"]
         for begin_s in self.jumps.begin_s(shared, float(times_s[-1])):
-            # A stream for each jump: what is drawn does not depend on how many there are.
+            # A stream for each jump: its draws do not depend on the number of jumps.
             own = shared.streams.rng(f"{shared.name}/{begin_s:.6f}")
             turn, length_m = own.uniform(0.0, 2.0 * math.pi), self.jumps.distance_m.draw(own)
             east_m, north_m = length_m * math.cos(turn), length_m * math.sin(turn)

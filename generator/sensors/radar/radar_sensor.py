@@ -53,7 +53,7 @@ COLUMNS = (
     Column("snr_db", "<f4", "signal over noise"),
     Column("instance_id", "<u2", "the strongest reflector; 0 = unlabelled or noise"),
     Column("category_id", "<u2", "of that instance; 0"),
-    Column("origin", "|u1", "0 false alarm, 1 a labelled object, 2 an unlabelled surface"),
+    Column("origin", "|u1", "0 false alarm, 1 an instance, 2 ground and the like"),
 )
 PRESETS = "gen_data.sensors.radar.presets"
 FALSE_ALARM = 1e-6

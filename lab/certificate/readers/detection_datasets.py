@@ -55,7 +55,7 @@ def _images(
             for box, label in zip(boxes, labels, strict=True)
         )
         height, width = image.shape[:2]
-        # OpenCV has blue first. Files of JPEG may have been compressed anew.
+        # OpenCV has blue first. Files of JPEG may have been compressed again.
         pixels = "" if path.endswith(".jpg") else labelled_images.digest_pixels(image[..., ::-1])
         yield labelled_images.LabelledImage(
             int(number), camera, split_of(Path(path).stem), (width, height), tuple(things), pixels

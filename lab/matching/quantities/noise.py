@@ -44,7 +44,7 @@ def noise_between(darkest: float, brightest: float) -> Callable[[Picture], float
             return float("nan")
         flat = usable & (slope <= np.quantile(slope[usable], FLATTEST))
         encoded = level[flat] / 255.0
-        # The slope of sRGB's transfer function turns noise of bytes into that of light.
+        # The slope of sRGB's transfer function turns noise of bytes into noise of light.
         steepness = (srgb_decode(encoded + 1e-3) - srgb_decode(encoded - 1e-3)) / 2e-3
         linear = variance[flat] / 255.0**2 * steepness**2
         return float(np.log2(np.median(linear / (srgb_decode(encoded) + USUAL_LEVEL)) + LEAST))
