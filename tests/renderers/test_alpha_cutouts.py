@@ -12,8 +12,12 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.core.scene import Body, Camera, Environment, Instance, Lidar, Light, Scene
 from gen_data.core.se3 import SE3, look_at
+from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.device_assets import remove_fringe
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.scene_packing import pack_world
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.embree import RayCaster, placed
 from tests.renderers.embree import cast
@@ -193,3 +197,25 @@ def test_an_environment_shines_through_holes() -> None:
     sky = shown.channels[Channel.RADIANCE][shown.channels[Channel.INSTANCE] == 0]
     assert len(sky) == pytest.approx(0.5 * 120 * 90, rel=0.1)
     np.testing.assert_allclose(sky, 100.0, rtol=1e-3)
+
+
+def test_rays_look_for_holes_only_where_a_body_has_some() -> None:
+    """Panes are clear to shadow rays, and no other ray needs to look at them again."""
+    glass = Material(transmission=1.0)
+    meshes = {
+        "floor": plane_mesh(1.0),
+        "pane": plane_mesh(1.0, (glass,)),
+        "grate": plane_mesh(1.0, (GRATE,)),
+    }
+    cache = DeviceCache(FakeLibrary(meshes, {"grate": grate_texture()}), open_device("cpu"))
+
+    def flags_of(*names: str) -> int:
+        scene = Scene("s", tuple(Body(name, name) for name in names))
+        return int(pack_world(scene, PINHOLE, cache).record.cutout_flags)
+
+    holes, clear = int(records.HOLES), int(records.CLEAR)
+    assert flags_of() == 0
+    assert flags_of("floor") == 0
+    assert flags_of("floor", "pane") == clear
+    assert flags_of("grate", "floor") == holes
+    assert flags_of("pane", "grate") == holes | clear

@@ -236,6 +236,7 @@ def _build_hierarchies(
     record.tree = wp.array(bvh.body_tree(low, high), dtype=wp.float32, device=device)
     record.cutouts = wp.array(cutouts, dtype=wp.int32, device=device)
     record.cutout_hierarchy = cutout_hierarchy.id if cutout_hierarchy else 0
+    record.cutout_flags = int(np.bitwise_or.reduce(body_records["cutouts"])) & cut
     return cutout_hierarchy
 
 

@@ -85,7 +85,7 @@ def closest_hit(world: records.World, o: wp.vec3, d: wp.vec3, reach: float, thro
     met.weight = wp.vec2(float(found[2]), 1.0 - float(found[1]) - float(found[2]))
     # Bodies with cut-outs are few: the main traversal skips them, and they are tested after it, up
     # to its hit.
-    if world.cutout_hierarchy != wp.uint64(0):
+    if (world.cutout_flags & through) != 0:
         met = closest_cutout_hit(world, o, d, through, met)
     return met
 
@@ -210,7 +210,7 @@ def blocker_of(world: records.World, path: Path, through: int):
         1.0,
         through,
     )
-    if b == NOBODY and world.cutout_hierarchy != wp.uint64(0):
+    if b == NOBODY and (world.cutout_flags & through) != 0:
         b = blocker_with_cutouts(world, path, through)
     return b
 

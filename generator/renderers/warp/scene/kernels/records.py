@@ -443,6 +443,7 @@ class World:
         tree: Hierarchy over the bodies' boxes, see gen_data.renderers.warp.scene.bvh.
         cutouts: Numbers of the bodies with HOLES or CLEAR faces.
         cutout_hierarchy: Warp's hierarchy over their boxes; 0 without any.
+        cutout_flags: HOLES, CLEAR or both: the flags that any of them has.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
         volumes: Boxes in which ``probes`` replace the sky's ambient light.
         probes: Irradiance over pi from around +X, -X, +Y, -Y, +Z and -Z, [probes, 6].
@@ -452,6 +453,7 @@ class World:
     tree: wp.array[wp.float32]
     cutouts: wp.array[wp.int32]
     cutout_hierarchy: wp.uint64
+    cutout_flags: int
     geometries: wp.array[Geometry]
     bodies: wp.array[BodyRecord]
     surfaces: wp.array[MaterialRecord]
