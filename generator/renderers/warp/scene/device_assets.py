@@ -166,14 +166,26 @@ def boxes_around(
     origin = np.array([column.min() for column in lows.T])
     top = np.array([column.max() for column in highs.T])
     cell_m = max(float((top - origin).max()) / _CELLS, 1e-9)
-    places = ((0.5 * (lows + highs) - origin) / cell_m).astype(np.int64)
-    cells = places @ np.array([1, _CELLS + 1, (_CELLS + 1) ** 2])
-    x, y, z = (highs - lows).T
+    # Column by column: numpy is slow on the short axis of [n, 3].
+    columns = tuple(zip(lows.T, highs.T, strict=True))
+    i, j, k = (
+        ((np.float32(0.5) * (low + high) - start) / np.float32(cell_m)).astype(np.int64)
+        for (low, high), start in zip(columns, origin, strict=True)
+    )
+    # NumPy sorts numbers of 16 bits ten times as fast.
+    cells = (i + (_CELLS + 1) * j + (_CELLS + 1) ** 2 * k).astype(np.int16)
+    x, y, z = (high - low for low, high in columns)
     large = np.flatnonzero(np.maximum(np.maximum(x, y), z) > 3.0 * cell_m)[:_LARGE_FACES_MAX]
-    cells[large] = -1 - large
+    cells[large] = -1
     order = np.argsort(cells, kind="stable")
-    starts = np.flatnonzero(np.diff(cells[order], prepend=np.iinfo(np.int64).min))
-    return np.minimum.reduceat(lows[order], starts), np.maximum.reduceat(highs[order], starts)
+    order[: len(large)] = large[::-1]
+    is_first = np.diff(cells.take(order), prepend=-2) != 0
+    is_first[: len(large)] = True
+    starts = np.flatnonzero(is_first)
+    return (
+        np.stack([np.minimum.reduceat(low.take(order), starts) for low, _ in columns], axis=1),
+        np.stack([np.maximum.reduceat(high.take(order), starts) for _, high in columns], axis=1),
+    )
 
 
 def is_convex_solid(vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -> bool:
