@@ -143,9 +143,8 @@ class Argoverse2(base.AssetExporter):
                 points = read_points(shard_dir, lidar, sample.index)
                 T_ego_lidar = _pose_of(row["mounts"][lidar])
                 sweep_s = sample.scene.lidar(lidar).sweep_s
-                write_bytes(
-                    folder / f"{sample.index:09d}.feather", scan_bytes(points, T_ego_lidar, sweep_s)
-                )
+                path = folder / f"{sample.index:09d}.feather"
+                write_bytes(path, scan_bytes(points, T_ego_lidar, sweep_s))
                 row["scan"] = True
                 row["boxes"] = list(_boxes(sample, lidar, points))
             rows.append(row)

@@ -121,9 +121,8 @@ class Cityscapes(base.AssetExporter):
             instances = find_instances(info, sample, camera, shard_dir, self.library)
             stem = shard_dir / self.type / f"{sample.index:09d}"
             for name, values in _values_of_codes().items():
-                write_bytes(
-                    _beside(stem, f"{name}.png"), label_png.encode_label_png(instances, values)
-                )
+                path = _beside(stem, f"{name}.png")
+                write_bytes(path, label_png.encode_label_png(instances, values))
             polygons = {
                 "imgHeight": instances.shape[0],
                 "imgWidth": instances.shape[1],

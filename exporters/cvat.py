@@ -26,7 +26,7 @@ import numpy as np
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
-from gen_data.exporters import coco, image_files, image_rows, label_colors
+from gen_data.exporters import coco, image_files, image_rows, label_colors, rle
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import split_rows
 from gen_data.exporters.mask_polygons import drawable_polygons
@@ -101,21 +101,18 @@ def shape_elements(
         corners = f'xtl="{box.x_min}" ytl="{box.y_min}" xbr="{box.x_max}" ybr="{box.y_max}"'
         return [f"<box {common} {corners}/>"]
     if shapes == "mask":
-        rle = ", ".join(map(str, row_runs(thing.mask)))
+        runs = ", ".join(map(str, row_runs(thing.mask)))
         place = f'left="{box.x_min}" top="{box.y_min}"'
         size = f'width="{box.width_px}" height="{box.height_px}"'
-        return [f'<mask {common} rle="{rle}" {place} {size}/>']
+        return [f'<mask {common} rle="{runs}" {place} {size}/>']
     outlines = (";".join(f"{x},{y}" for x, y in p.tolist()) for p in drawable_polygons(thing.mask))
     return [f'<polygon {common} points="{points}"/>' for points in outlines]
 
 
 def row_runs(mask: MaskPx) -> list[int]:
     """Lengths of the runs of a mask's crop, row by row, zeros first."""
-    flat = mask.pixels.ravel()
-    borders = np.flatnonzero(flat[1:] != flat[:-1]) + 1
-    ends = np.concatenate([[0] if flat[0] else [], borders, [flat.size]]).astype(np.int64)
-    lengths: list[int] = np.diff(ends, prepend=0).tolist()
-    return lengths
+    height, width = mask.pixels.shape
+    return rle.run_lengths(MaskPx(0, 0, mask.pixels.T), width, height)
 
 
 def _head(info: DatasetInfo, split: str) -> str:

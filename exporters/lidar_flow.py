@@ -155,9 +155,8 @@ class LidarFlow(base.AssetExporter):
                 split, folder = frame.row["split"], frame.shard_dir / self.type
                 if "kitti" in self.layouts:
                     name = f"{number:06d}_{frame.row['step']:06d}.npz"
-                    sequences.write_bytes(
-                        dataset_dir / "kitti" / split / name, self._pair(frame, later)
-                    )
+                    path = dataset_dir / "kitti" / split / name
+                    sequences.write_bytes(path, self._pair(frame, later))
                 if "av2" in self.layouts:
                     log = f"{info.name}-{number:06d}"
                     name = f"{time_ns_of(info, number, frame.row['time_s'])}.feather"

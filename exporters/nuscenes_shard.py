@@ -164,10 +164,8 @@ class ShardWriter:
         """Write a radar's detections, and add them to the number of each instance."""
         path = table_path(self.shard_dir, channel.sensor, sample.index)
         rows = measurement_tables.read_rows(path, self.info.sensor(channel.sensor))
-        write_bytes(
-            reading_path(self.info, self.shard_dir, channel, sample.index),
-            nuscenes_files.radar_bytes(rows),
-        )
+        target = reading_path(self.info, self.shard_dir, channel, sample.index)
+        write_bytes(target, nuscenes_files.radar_bytes(rows))
         for instance_id in rows["instance_id"].tolist():
             detections[instance_id] = detections.get(instance_id, 0) + 1
 
@@ -195,10 +193,8 @@ class ShardWriter:
         numbers = {k: thing.number for k, thing in things.items()}
         panoptic = nuscenes_files.panoptic_labels(labels, found.members, numbers)
         write_bytes(label_path(self.shard_dir, "lidarseg", sample.index), labels.tobytes())
-        write_bytes(
-            label_path(self.shard_dir, "panoptic", sample.index),
-            nuscenes_files.panoptic_bytes(panoptic),
-        )
+        path = label_path(self.shard_dir, "panoptic", sample.index)
+        write_bytes(path, nuscenes_files.panoptic_bytes(panoptic))
         views = nuscenes_frames.views_by_instance(sample)
         rows = []
         for number, thing in things.items():

@@ -74,9 +74,8 @@ def toaster(rng: VariantRng) -> Solid:
     body: Box = ((-0.5 * d, -0.5 * w, 0.0), (0.5 * d, 0.5 * w, h))
     patches = [cushion(*body, 0, 0.03)]
     for x in (-0.03, 0.03):
-        patches.append(
-            shapes.block((x - 0.012, -0.36 * w, h), (x + 0.012, 0.36 * w, h + 0.001), 0.0, 1)
-        )
+        patch = shapes.block((x - 0.012, -0.36 * w, h), (x + 0.012, 0.36 * w, h + 0.001), 0.0, 1)
+        patches.append(patch)
     lever = (-0.02, 0.5 * w, 0.6 * h), (0.02, 0.5 * w + 0.03, 0.6 * h + 0.012)
     patches.append(shapes.block(*lever, 0.003, 1))
     return solid(patches, [_case(rng), _DARK], [body])
@@ -208,9 +207,8 @@ def desk_fan(rng: VariantRng) -> Solid:
             patches.append(shapes.lathe(ring, 40, 1).rotated("y", 0.5 * math.pi).moved(x, 0.0, z))
     for k in range(4):
         blade = shapes.block((0.0, 0.01, 0.02), (0.004, 0.09, 0.9 * r), 0.0, 0)
-        patches.append(
-            blade.rotated("z", 0.35).rotated("x", 0.5 * math.pi * k).moved(0.012, 0.0, z)
-        )
+        patch = blade.rotated("z", 0.35).rotated("x", 0.5 * math.pi * k).moved(0.012, 0.0, z)
+        patches.append(patch)
     return solid(patches, [_case(rng), _STEEL], [((-0.1, -r, 0.0), (0.06, r, z + r))])
 
 
@@ -305,9 +303,8 @@ def ladder(rng: VariantRng) -> Solid:
     for k in range(1, steps):
         t = k / steps
         x, y = 0.3 - 0.26 * t, w * (1.0 - 0.2 * t)
-        patches.append(
-            shapes.block((x - 0.05, -y, t * h - 0.012), (x + 0.03, y, t * h + 0.012), 0.003, 0)
-        )
+        patch = shapes.block((x - 0.05, -y, t * h - 0.012), (x + 0.03, y, t * h + 0.012), 0.003, 0)
+        patches.append(patch)
     patches.append(shapes.block((-0.08, -0.8 * w, h - 0.01), (0.1, 0.8 * w, h + 0.015), 0.006, 1))
     looks = [metal_material((0.8, 0.8, 0.8), 0.35), _DARK]
     return solid(patches, looks, [((-0.34, -w, 0.0), (0.3, w, h))])

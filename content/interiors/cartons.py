@@ -29,11 +29,10 @@ def tape_carton(
     patches.append(shapes.block(low, high, 0.003, card))
     middle, t = 0.5 * (y0 + y1), 0.0006
     # Tape runs along the longer side and hangs over the ends.
-    patches.append(
-        shapes.block(
-            (x0 - t, middle - 0.025, z1 - 0.002), (x1 + t, middle + 0.025, z1 + t), 0.0, tape
-        )
+    patch = shapes.block(
+        (x0 - t, middle - 0.025, z1 - 0.002), (x1 + t, middle + 0.025, z1 + t), 0.0, tape
     )
+    patches.append(patch)
     patches += [
         shapes.block((x - t, middle - 0.025, z1 - 0.06), (x + t, middle + 0.025, z1 + t), 0.0, tape)
         for x in (x0, x1)

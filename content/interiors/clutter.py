@@ -130,9 +130,8 @@ def pen_cup(rng: VariantRng) -> Solid:
         low, high = 0.35 * r, 0.85 * r
         c, s = math.cos(a), math.sin(a)
         top = h + rng.between(0.02, 0.07)
-        patches.append(
-            rod((-low * c, -low * s, 0.006), (high * c, high * s, top), 0.004, 1 + k % 3, 8)
-        )
+        patch = rod((-low * c, -low * s, 0.006), (high * c, high * s, top), 0.004, 1 + k % 3, 8)
+        patches.append(patch)
     looks = [lacquer(rng), _DARK, _plastic(rng), painted_material("#e9b93a", 0.5)]
     return solid(patches, looks, [((-r, -r, 0.0), (r, r, h))])
 
@@ -289,9 +288,8 @@ def spice_rack(rng: VariantRng) -> Solid:
     for row in range(2):
         z = 0.13 * row + 0.004
         patches.append(board((-0.055, -0.5 * w + 0.012, z), (0.055, 0.5 * w - 0.012, z + 0.012)))
-        patches.append(
-            board((0.048, -0.5 * w + 0.012, z + 0.03), (0.056, 0.5 * w - 0.012, z + 0.05))
-        )
+        patch = board((0.048, -0.5 * w + 0.012, z + 0.03), (0.056, 0.5 * w - 0.012, z + 0.05))
+        patches.append(patch)
         for k in range(count):
             y = (k + 0.5) * (w - 0.03) / count - 0.5 * w + 0.015
             if rng.chance(0.15):
@@ -327,9 +325,8 @@ def toothbrush_cup(rng: VariantRng) -> Solid:
         c, s = math.cos(a), math.sin(a)
         tip = (0.95 * r * c, 0.95 * r * s, h + 0.08)
         patches.append(rod((-0.5 * r * c, -0.5 * r * s, 0.008), tip, 0.0035, 1 + k % 2, 8))
-        patches.append(
-            shapes.block((-0.004, -0.006, -0.025), (0.012, 0.006, 0.0), 0.002, 3).moved(*tip)
-        )
+        patch = shapes.block((-0.004, -0.006, -0.025), (0.012, 0.006, 0.0), 0.002, 3).moved(*tip)
+        patches.append(patch)
     looks = [
         Material(draw_linear(GLAZES, 0.08, rng), 0.2),
         _plastic(rng),
@@ -399,18 +396,14 @@ def game_box(rng: VariantRng) -> Solid:
     """Boxes of games or puzzles on each other. Slots: sides, prints."""
     patches: list[Patch] = []
     z, x, y = 0.0, 0.0, 0.0
-    sizes = sorted(
-        (rng.between(0.13, 0.19) for _ in range(rng.turn((1, 2, 3), "count"))), reverse=True
-    )
+    drawn = (rng.between(0.13, 0.19) for _ in range(rng.turn((1, 2, 3), "count")))
+    sizes = sorted(drawn, reverse=True)
     for k, b in enumerate(sizes):
         a, t = min(b, rng.between(0.13, 0.15)), rng.between(0.04, 0.07)
+        points = [[(a, -b, t + 3e-4), (a, b, t + 3e-4)], [(-a, -b, t + 3e-4), (-a, b, t + 3e-4)]]
         part = [
             shapes.block((-a, -b, 0.0), (a, b, t), 0.002, k % 2),
-            shapes.grid(
-                np.array(
-                    [[(a, -b, t + 3e-4), (a, b, t + 3e-4)], [(-a, -b, t + 3e-4), (-a, b, t + 3e-4)]]
-                )
-            ).painted(2),
+            shapes.grid(np.array(points)).painted(2),
         ]
         turn = rng.between(-0.1, 0.1) if k else 0.0
         patches += [p.rotated("z", turn).moved(0.0, 0.0, z) for p in part]
@@ -451,9 +444,8 @@ def plush_toy(rng: VariantRng) -> Solid:
             lump(0.063, sy * 0.026, 0.22, 0.006, 0.006, 0.006, 2),
         ]
     moved = [patch.scaled(s, s, s) for patch in patches]
-    fur = Material(
-        draw_linear(("#8a5a34", "#c9a77a", "#5b4636", "#e6dccb", "#b9a7b7"), 0.1, rng), 1.0
-    )
+    color = draw_linear(("#8a5a34", "#c9a77a", "#5b4636", "#e6dccb", "#b9a7b7"), 0.1, rng)
+    fur = Material(color, 1.0)
     belly = Material(draw_linear(("#e9d9bf", "#f0ebe2"), 0.05, rng), 1.0)
     box: Box = ((-0.06 * s, -0.09 * s, 0.0), (0.12 * s, 0.09 * s, 0.25 * s))
     return solid(moved, [fur, belly, painted_material("#101010", 0.1)], [box])
@@ -477,9 +469,8 @@ def backpack(rng: VariantRng) -> Solid:
         ]
         section = np.array([(-0.006, -0.028), (0.006, -0.028), (0.006, 0.028), (-0.006, 0.028)])
         patches.append(shapes.sweep(shapes.spline(path, 12), section, up=(1.0, 0.0, 0.0), slot=1))
-    dark = Material(
-        draw_linear(("#26323f", "#3d3d3f", "#7a2f33", "#3f5d3a", "#4b4064"), 0.15, rng), 0.85
-    )
+    color = draw_linear(("#26323f", "#3d3d3f", "#7a2f33", "#3f5d3a", "#4b4064"), 0.15, rng)
+    dark = Material(color, 0.85)
     return solid(patches, [dark, _DARK], [((-x, -y, 0.0), (x + 0.04, y, h))])
 
 

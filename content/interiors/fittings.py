@@ -64,13 +64,12 @@ def _tube(r0: float, r1: float, z0: float, z1: float, slot: int) -> Patch:
 
 def ceiling_lamp(rng: VariantRng) -> Solid:
     """A lamp under the ceiling, which is at z = 0. Slots: metal, shade."""
-    paint = rng.choose(
-        (
-            painted_material("#26282b", 0.4),
-            metal_material(STAINLESS, 0.3),
-            painted_material("#eeece6", 0.4),
-        )
+    options = (
+        painted_material("#26282b", 0.4),
+        metal_material(STAINLESS, 0.3),
+        painted_material("#eeece6", 0.4),
     )
+    paint = rng.choose(options)
     if rng.seed % 3 == 0:
         r, h = rng.between(0.16, 0.26, "radius_m"), rng.between(0.07, 0.12, "height_m")
         glow = shapes.lathe(
@@ -114,13 +113,12 @@ def standing_lamp(family: str, seed: int, measures: Measures) -> Solid:
     rng = variant_rng(family, seed)
     z, r, foot_m = drawn(rng, measures).values()
     h = r * rng.between(0.9, 1.3)
-    paint = rng.choose(
-        (
-            metal_material(STAINLESS, 0.3),
-            painted_material("#26282b", 0.4),
-            metal_material((0.75, 0.58, 0.34), 0.3),
-        )
+    options = (
+        metal_material(STAINLESS, 0.3),
+        painted_material("#26282b", 0.4),
+        metal_material((0.75, 0.58, 0.34), 0.3),
     )
+    paint = rng.choose(options)
     patches = [
         disc(0, 0, 0.0, 0.02, foot_m, 0, 32),
         rod((0.0, 0.0, 0.01), (0.0, 0.0, z - 0.5 * h), 0.011, 0),
@@ -229,16 +227,15 @@ def picture(rng: VariantRng) -> Solid:
             p.painted(1)
             for p in _frame(wide + 0.016, high + 0.016, 0.008, 0.0025, 0.0008, (0.01, a - 0.008))
         ]
-    edge = rng.choose(
-        (
-            painted_material("#1f1f20", 0.4),
-            wood(rng),
-            wood(rng),
-            metal_material((0.8, 0.66, 0.38), 0.35),
-            metal_material(ALUMINIUM, 0.4),
-            painted_material("#f0efeb", 0.5),
-        )
+    options = (
+        painted_material("#1f1f20", 0.4),
+        wood(rng),
+        wood(rng),
+        metal_material((0.8, 0.66, 0.38), 0.35),
+        metal_material(ALUMINIUM, 0.4),
+        painted_material("#f0efeb", 0.5),
     )
+    edge = rng.choose(options)
     card = painted_material(rng.choose(("#f3f1ea", "#f7f6f2", "#e6e0d2", "#3a3b3d")), 0.85)
     gloss = 0.12 if rng.chance(0.6) else 0.7
     return solid(patches, [edge, card, printed_material(image, gloss)], [back])
@@ -325,23 +322,21 @@ def screen(family: str, seed: int, measures: Measures) -> Solid:
                     0.002,
                 ),
             ]
-    drop = np.array(
-        [
-            (-0.022, 0.12 * w, lift_m + 0.35 * h),
-            (-0.05, 0.12 * w, lift_m + 0.12 * h),
-            (-0.07, 0.1 * w, 0.02),
-            (-0.085, 0.02 * w, 0.0045),
-            (-0.09, -0.12 * w, 0.0045),
-        ]
-    )
+    points = [
+        (-0.022, 0.12 * w, lift_m + 0.35 * h),
+        (-0.05, 0.12 * w, lift_m + 0.12 * h),
+        (-0.07, 0.1 * w, 0.02),
+        (-0.085, 0.02 * w, 0.0045),
+        (-0.09, -0.12 * w, 0.0045),
+    ]
+    drop = np.array(points)
     line = shapes.spline(drop.tolist(), 24)
     line[:, 2] = np.maximum(line[:, 2], 0.0042)
     patches.append(shapes.sweep(line, shapes.circle(0.0038, 7), up=(0.0, 1.0, 0.0)))
-    patches.append(
-        shapes.block(
-            (-0.045, -0.3 * w, lift_m + 0.15 * h), (-0.02, 0.3 * w, lift_m + 0.6 * h), 0.006
-        )
+    patch = shapes.block(
+        (-0.045, -0.3 * w, lift_m + 0.15 * h), (-0.02, 0.3 * w, lift_m + 0.6 * h), 0.006
     )
+    patches.append(patch)
     dark = Material((0.01, 0.01, 0.011), 0.12, role="screen")
     foot: Box = ((-0.1, -0.4 * w, 0.0), (0.1, 0.4 * w, 0.012))
     return solid(patches, [painted_material("#17181a", 0.35), dark], [panel, foot])
@@ -413,9 +408,8 @@ def house_plant(rng: VariantRng) -> Solid:
         0.04 * rng.between(0.7, 1.2),
     )
     leaf = Material(green, 0.45, diffuse_transmission=_scaled(green, 0.8), role="leaf")
-    clay = Material(
-        draw_linear(("#b5643c", "#f0ede6", "#3a3d40", "#8a9a8d", "#d8c7ab"), 0.1, rng), 0.6
-    )
+    color = draw_linear(("#b5643c", "#f0ede6", "#3a3d40", "#8a9a8d", "#d8c7ab"), 0.1, rng)
+    clay = Material(color, 0.6)
     top = h + 0.6 * length
     boxes = [((-r, -r, 0.0), (r, r, h)), ((-0.6 * r, -0.6 * r, h), (0.6 * r, 0.6 * r, top))]
     return solid(patches, [clay, Material((0.05, 0.035, 0.025), 1.0), leaf], boxes)
@@ -431,12 +425,10 @@ def _leaf(rng: VariantRng, length: float) -> Patch:
     z = np.concatenate([[0.0], np.cumsum(np.cos(angle[:-1]))]) * length / (steps - 1)
     wide = 0.14 * length * np.sin(np.pi * np.clip((s - 0.25) / 0.75, 0.0, 1.0)) + 0.004
     side = np.array([-1.0, 0.0, 1.0])
-    points = np.stack(
-        np.broadcast_arrays(
-            x[:, None], wide[:, None] * side, z[:, None] + 0.15 * wide[:, None] * np.abs(side)
-        ),
-        axis=2,
+    axes = np.broadcast_arrays(
+        x[:, None], wide[:, None] * side, z[:, None] + 0.15 * wide[:, None] * np.abs(side)
     )
+    points = np.stack(axes, axis=2)
     sheet = shapes.grid(points, slot=2)
     return join_patches([sheet, sheet.flipped()])
 

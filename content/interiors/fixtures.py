@@ -74,9 +74,8 @@ def tap(x: float, y: float, z: float, height_m: float, slot: int) -> list[Patch]
         (x + 0.12, y, z + height_m + 0.005),
         (x + 0.16, y, z + height_m - 0.04),
     ]
-    spout = shapes.sweep(
-        shapes.spline(bow, 28), shapes.circle(0.0105, 12), up=(0.0, 1.0, 0.0), slot=slot
-    )
+    path = shapes.spline(bow, 28)
+    spout = shapes.sweep(path, shapes.circle(0.0105, 12), up=(0.0, 1.0, 0.0), slot=slot)
     return [
         disc(x, y, z, z + 0.006, 0.03, slot),
         disc(x, y, z, z + 0.07, 0.021, slot),

@@ -50,12 +50,8 @@ def _houses(image: Float32, y: Float32, rng: VariantRng, depth: int) -> None:
     for _ in range(int(rng.between(1, 4))):
         middle, half = rng.between(0.1, 0.9), rng.between(0.04, 0.09)
         eaves = _HORIZON + rng.between(0.08, 0.16) + 0.05 * depth
-        wall = np.array(
-            rng.choose(
-                [(0.86, 0.83, 0.76), (0.72, 0.46, 0.36), (0.9, 0.89, 0.86), (0.78, 0.7, 0.56)]
-            ),
-            np.float32,
-        )
+        options = [(0.86, 0.83, 0.76), (0.72, 0.46, 0.36), (0.9, 0.89, 0.86), (0.78, 0.7, 0.56)]
+        wall = np.array(rng.choose(options), np.float32)
         roof = np.array(rng.choose([(0.48, 0.24, 0.18), (0.32, 0.32, 0.34), (0.4, 0.3, 0.26)]))
         beside = np.abs(x - middle)
         inside = (beside < half) & (y < eaves)

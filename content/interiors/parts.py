@@ -141,9 +141,8 @@ def solid(patches: Sequence[Patch], materials: Sequence[Material], boxes: Sequen
 
 def wood(rng: VariantRng, roughness: float = 0.45) -> Material:
     """Oiled or varnished wood."""
-    return presets.patterned_material(
-        f"texture/wood_grain?seed={int(rng.between(0, _WOODS))}", 0.0, roughness
-    )
+    texture = f"texture/wood_grain?seed={int(rng.between(0, _WOODS))}"
+    return presets.patterned_material(texture, 0.0, roughness)
 
 
 def lacquer(rng: VariantRng, roughness: float = 0.35) -> Material:
@@ -162,9 +161,8 @@ def upholstery(rng: VariantRng) -> Material:
         return presets.patterned_material(
             f"texture/leather?seed={int(rng.between(0, 16))}", 0.2, 0.55
         )
-    return presets.patterned_material(
-        f"texture/fabric?seed={int(rng.between(0, _FABRICS))}", 0.15, 0.95
-    )
+    texture = f"texture/fabric?seed={int(rng.between(0, _FABRICS))}"
+    return presets.patterned_material(texture, 0.15, 0.95)
 
 
 def cloth(rng: VariantRng) -> Material:

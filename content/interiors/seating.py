@@ -185,14 +185,13 @@ def chair(rng: VariantRng) -> Solid:
         for k in range(rng.turn((2, 3), "slats")):
             h = back_z - 0.05 - 0.13 * k
             lean = x - 0.07 * (h - z) / (back_z - z)
-            patches.append(
-                board(
-                    (lean - 0.009, -0.5 * w + 0.02, h - 0.035),
-                    (lean + 0.009, 0.5 * w - 0.02, h + 0.035),
-                    0,
-                    0.006,
-                )
+            patch = board(
+                (lean - 0.009, -0.5 * w + 0.02, h - 0.035),
+                (lean + 0.009, 0.5 * w - 0.02, h + 0.035),
+                0,
+                0.006,
             )
+            patches.append(patch)
     steel = metal_material(STEEL, 0.35) if rng.chance(0.5) else painted_material("#26282b", 0.4)
     body = upholstery(rng) if soft else (wood(rng) if rng.chance(0.65) else lacquer(rng))
     boxes: list[Box] = [seat, ((x - 0.08, -0.5 * w, z), (x + 0.01, 0.5 * w, back_z))]
@@ -250,19 +249,15 @@ def office_chair(rng: VariantRng) -> Solid:
         c, s = 0.29 * math.cos(a), 0.29 * math.sin(a)
         arm = np.array([(0.0, 0.0, 0.115), (0.5 * c, 0.5 * s, 0.105), (c, s, 0.07)])
         taper = np.linspace(1.25, 0.8, 8)
-        patches.append(
-            shapes.sweep(
-                shapes.spline(arm.tolist(), 8), shapes.circle(0.018, 10), scale=taper, slot=1
-            )
-        )
+        path = shapes.spline(arm.tolist(), 8)
+        patches.append(shapes.sweep(path, shapes.circle(0.018, 10), scale=taper, slot=1))
         for wheel in (-0.02, 0.008):
             patches.append(rod((c, s + wheel, 0.028), (c, s + wheel + 0.014, 0.028), 0.028, 1, 16))
     if rng.chance(0.7):
         for sy in (-1, 1):
             y = sy * (0.5 * w + 0.03)
-            patches.append(
-                cushion((-0.12, y - 0.03, z + 0.18), (0.14, y + 0.03, z + 0.215), 1, 0.015)
-            )
+            patch = cushion((-0.12, y - 0.03, z + 0.18), (0.14, y + 0.03, z + 0.215), 1, 0.015)
+            patches.append(patch)
             patches.append(rod((0.0, y, z + 0.19), (0.0, y, z - 0.06), 0.014, 1))
             patches.append(rod((0.0, y, z - 0.06), (0.0, 0.3 * y, z - 0.07), 0.014, 1))
     dark = painted_material("#1d1e20", 0.5) if rng.chance(0.7) else metal_material(ALUMINIUM, 0.3)
@@ -326,13 +321,12 @@ def _rectangular_table(
     apron = 0.02
     for sx in (-1, 1):
         x = sx * (0.5 * d - 0.05)
-        patches.append(
-            board(
-                (x - apron / 2, -0.5 * w + 0.06, z - thick - 0.08),
-                (x + apron / 2, 0.5 * w - 0.06, z - thick),
-                1,
-            )
+        patch = board(
+            (x - apron / 2, -0.5 * w + 0.06, z - thick - 0.08),
+            (x + apron / 2, 0.5 * w - 0.06, z - thick),
+            1,
         )
+        patches.append(patch)
     boxes: list[Box] = [top, *_legs_under(d, w, z)]
     if drawers:
         chest: Box = (

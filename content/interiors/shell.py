@@ -158,9 +158,8 @@ def door_leaf(size_m: tuple[float, float] = (0.84, 2.02), style: int = 0) -> Sol
             panel = _raised_panel((y0, y1), (a + 0.04, b - 0.04)).moved(t)
             patches += [panel, panel.rotated("z", math.pi).moved(0.0, y0 + y1)]
     if style == 3:
-        patches.append(
-            shapes.block((-t - 0.002, 0.16, 0.9), (t + 0.002, w - 0.16, h - 0.16), 0.0, 2)
-        )
+        patch = shapes.block((-t - 0.002, 0.16, 0.9), (t + 0.002, w - 0.16, h - 0.16), 0.0, 2)
+        patches.append(patch)
     for sign in (-1, 1):
         patches += [
             shapes.block(
@@ -238,9 +237,8 @@ def outside(radius_m: float = 130.0) -> Solid:
     """
     turn = 2.0 * math.pi * np.arange(49) / 48
     reach = np.array([0.05, 0.15, 0.4, 1.0])[:, None] * radius_m
-    points = np.stack(
-        np.broadcast_arrays(reach * np.cos(turn), reach * np.sin(turn), np.zeros(1)), axis=2
-    )
+    axes = np.broadcast_arrays(reach * np.cos(turn), reach * np.sin(turn), np.zeros(1))
+    points = np.stack(axes, axis=2)
     middle = shapes.fan(points[0, :-1])
     ground = patterned_material("texture/grass?seed=0", 3.0, 1.0)
     ring = shapes.grid(points).flipped()
@@ -269,9 +267,8 @@ def blind(size_m: Vec3 = (1.4, 0.5, 0.03), style: int = 0) -> Solid:
             slat = shapes.block((-0.011, -0.5 * w, -0.0006), (0.011, 0.5 * w, 0.0006))
             patches.append(slat.rotated("y", 0.7).moved(x, 0.0, z))
     else:
-        patches.append(
-            shapes.block((x, -0.5 * w + 0.01, -drop), (x + 0.001, 0.5 * w - 0.01, -0.03))
-        )
+        patch = shapes.block((x, -0.5 * w + 0.01, -drop), (x + 0.001, 0.5 * w - 0.01, -0.03))
+        patches.append(patch)
     end: Box = ((x - 0.008, -0.5 * w, -drop - 0.012), (x + 0.008, 0.5 * w, -drop))
     patches.append(shapes.block(*end, 0.003, 1))
     cloth = replace(painted_material("#ece8dd", 0.9), diffuse_transmission=(0.3, 0.28, 0.24))

@@ -174,16 +174,13 @@ def drape(
     pleat = 0.012 * (1.0 + np.sin(2.0 * math.pi * s / 0.19 + 2.0 * np.sin(3.0 * s) + np.sign(t)))
     out = np.sign(t) * hung * (0.4 * lift + pleat)
     skew = rng.between(-0.02, 0.02) * (s - x0)
-    points = np.stack(
-        np.broadcast_arrays(
-            x0 + x, y + out + skew, z + down + fall + (lift + swell) * (1.0 - 0.7 * hung)
-        ),
-        axis=2,
+    axes = np.broadcast_arrays(
+        x0 + x, y + out + skew, z + down + fall + (lift + swell) * (1.0 - 0.7 * hung)
     )
+    points = np.stack(axes, axis=2)
     # The under side, nearer to the mattress; both meet at a round hem.
-    inward = np.stack(
-        np.broadcast_arrays(0.0 * s, -np.sign(t) * hung * _HEM_M, (hung - 1.0) * _HEM_M), axis=2
-    )
+    coordinates = np.broadcast_arrays(0.0 * s, -np.sign(t) * hung * _HEM_M, (hung - 1.0) * _HEM_M)
+    inward = np.stack(coordinates, axis=2)
     under = points + inward
     rim = [
         np.stack([points[0], under[0]]),
@@ -507,11 +504,10 @@ def _jacket(rng: VariantRng) -> list[Patch]:
         t = np.linspace(0.0, 1.0, 26)
         crease = 1.0 + 0.12 * np.sin(36.0 * t) * np.exp(-(((t - 0.5) / 0.25) ** 2))
         size = np.stack([0.055 * (1.0 - 0.2 * t) * crease, 0.028 * crease], axis=1)
-        patches.append(
-            shapes.sweep(
-                shapes.spline(path, 26), shapes.circle(1.0, 14), up=(1.0, 0.0, 0.0), scale=size
-            )
+        patch = shapes.sweep(
+            shapes.spline(path, 26), shapes.circle(1.0, 14), up=(1.0, 0.0, 0.0), scale=size
         )
+        patches.append(patch)
     return patches
 
 
@@ -551,12 +547,10 @@ def _over_rail(
         x = np.concatenate([np.full(12, radius), radius * np.cos(bend), np.full(12, -radius)])
         z = np.concatenate([-front_m * levels, radius * np.sin(bend), -back_m * levels[::-1]])
         fall = np.clip(-z / front_m, 0.0, 1.0)[:, None]
-        return np.stack(
-            np.broadcast_arrays(
-                x[:, None] + depth * fall * wave, y, z[:, None] + fall * tilt * np.sign(x)[:, None]
-            ),
-            axis=2,
+        axes = np.broadcast_arrays(
+            x[:, None] + depth * fall * wave, y, z[:, None] + fall * tilt * np.sign(x)[:, None]
         )
+        return np.stack(axes, axis=2)
 
     outer, inner = sheet(radius_m + 0.0065), sheet(radius_m)
     loop = np.concatenate([outer, inner[::-1], outer[:1]])

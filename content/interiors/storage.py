@@ -75,9 +75,8 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
         # One kitchen has one look: variants of the same number match.
         shared = variant_rng("kitchen", seed // VARIANTS_PER_LOOK)
         facing = front(shared)
-        worktop = patterned_material(
-            f"texture/{shared.choose(_WORKTOPS)}?seed={int(shared.between(0, 16))}", 0.5, 0.3
-        )
+        texture = f"texture/{shared.choose(_WORKTOPS)}?seed={int(shared.between(0, 16))}"
+        worktop = patterned_material(texture, 0.5, 0.3)
         return [painted_material("#eeede9", 0.5), facing, steel, worktop]
     body = front(rng)
     return [body, body if rng.chance(0.5) else lacquer(rng), steel]
@@ -117,9 +116,8 @@ def cupboard(family: str, seed: int, measures: Measures) -> Solid:
         top: Box = ((-x - 0.0, -0.5 * w, high), (x + 0.03, 0.5 * w, 0.9))
         patches.append(shapes.block(*top, 0.003, 3))
         # Behind the gaps between fronts it is dark.
-        patches.append(
-            board((x - 0.012, -0.5 * w + _T, high - 0.03), (x - 0.002, 0.5 * w - _T, high), 0)
-        )
+        patch = board((x - 0.012, -0.5 * w + _T, high - 0.03), (x - 0.002, 0.5 * w - _T, high), 0)
+        patches.append(patch)
         outer.append(top)
     if family == "wardrobe":
         rail = levels[1] + RAIL_M
@@ -432,9 +430,8 @@ def _sacks(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
             x, y = -0.39 + 0.39 * k, 0.0
             sack = pillow(0.185, 0.37, 0.15, rng, 1)
             shift = rng.between(-0.012, 0.012)
-            patches.append(
-                sack.rotated("z", rng.between(-0.04, 0.04)).moved(x + shift, y + shift, row * t)
-            )
+            patch = sack.rotated("z", rng.between(-0.04, 0.04)).moved(x + shift, y + shift, row * t)
+            patches.append(patch)
     paper = rng.choose(("#c8a878", "#e9e6de", "#d9d2c3", "#b9a58a"))
     return patches, [painted_material(paper, 0.75)], rows * t + 0.03
 
@@ -453,14 +450,10 @@ def _drums(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
             patches.append(rod((x + 0.1, y, h - 0.02), (x + 0.1, y, h - 0.002), 0.025, 2, 14))
             label = shapes.lathe([(r + 0.001, 0.4 * h), (r + 0.001, 0.6 * h)], 36, 3)
             keep = label.corners_m[:, :, 0].min(axis=1) > 0.35 * r
-            patches.append(
-                replace(
-                    label,
-                    corners_m=label.corners_m[keep],
-                    uvs=label.uvs[keep],
-                    slots=label.slots[keep],
-                ).moved(x, y)
-            )
+            patch = replace(
+                label, corners_m=label.corners_m[keep], uvs=label.uvs[keep], slots=label.slots[keep]
+            ).moved(x, y)
+            patches.append(patch)
     paint = rng.choose(("#1f5fa8", "#2b2d30", "#a3261d", "#2f6f4f", "#d9d6cf"))
     return (
         patches,
@@ -485,14 +478,10 @@ def _crates(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
                 x0, y0, z0 = -0.585 + 0.59 * i, -0.385 + 0.39 * j, row * h
                 x1, y1, z1 = x0 + 0.58, y0 + 0.38, z0 + h - 0.004
                 slot = 1 + int(rng.random() * 2)
-                patches.append(
-                    shapes.block(
-                        (x0 + 0.012, y0 + 0.012, z0),
-                        (x1 - 0.012, y1 - 0.012, z1 - 0.03),
-                        0.004,
-                        slot,
-                    )
+                patch = shapes.block(
+                    (x0 + 0.012, y0 + 0.012, z0), (x1 - 0.012, y1 - 0.012, z1 - 0.03), 0.004, slot
                 )
+                patches.append(patch)
                 for z in (z0, z1 - 0.03, z0 + 0.45 * h):
                     patches.append(shapes.block((x0, y0, z), (x1, y1, z + 0.022), 0.004, slot))
                 for k in range(6):
@@ -505,14 +494,13 @@ def _crates(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
                     patches.append(
                         shapes.block((x0, a - 0.006, z0), (x1, a + 0.006, z1), 0.0, slot)
                     )
-    colors = rng.choose(
-        (
-            ("#1f5fa8", "#1f5fa8"),
-            ("#a3261d", "#5b5f64"),
-            ("#2f6f4f", "#2f6f4f"),
-            ("#5b5f64", "#e6c229"),
-        )
+    options = (
+        ("#1f5fa8", "#1f5fa8"),
+        ("#a3261d", "#5b5f64"),
+        ("#2f6f4f", "#2f6f4f"),
+        ("#5b5f64", "#e6c229"),
     )
+    colors = rng.choose(options)
     return patches, [painted_material(c, 0.45) for c in colors], top
 
 

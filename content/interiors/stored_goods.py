@@ -194,11 +194,10 @@ def hanging_clothes(rng: VariantRng) -> Solid:
     while y < 0.5 * wide - 0.02:
         long, slot = rng.between(0.55, 0.98), int(rng.random() * 5)
         garment = hang_garment(rng, long, slot, thin=True).scaled(1.0, 0.8, 1.0)
-        patches.append(
-            garment.rotated("z", 0.5 * math.pi + rng.between(-0.12, 0.12)).moved(
-                0.0, y, RAIL_M - 0.09
-            )
+        patch = garment.rotated("z", 0.5 * math.pi + rng.between(-0.12, 0.12)).moved(
+            0.0, y, RAIL_M - 0.09
         )
+        patches.append(patch)
         patches.append(rod((0.0, y, RAIL_M - 0.1), (0.0, y, RAIL_M + 0.012), 0.0025, 5, 6))
         y += rng.between(0.028, 0.05)
     for k in range(int(rng.between(2, 6))):

@@ -426,9 +426,8 @@ def _map(w: int, h: int, rng: VariantRng) -> UInt8:
     _over(image, color("#fbfaf6"), smoothstep(0.12, 0.06, lanes))
     green = _noise(w, h, (7, 7), 3, rng)
     _over(image, color("#c3d3a4"), smoothstep(1.05, 1.12, green))
-    _over(
-        image, color(rng.choose(("#e9b96a", "#d98f7a", "#ffffff"))), smoothstep(0.06, 0.035, roads)
-    )
+    options = ("#e9b96a", "#d98f7a", "#ffffff")
+    _over(image, color(rng.choose(options)), smoothstep(0.06, 0.035, roads))
     river = _noise(w, h, (2, 2), 3, rng)
     _over(image, color(rng.choose(("#8fb8cf", "#6f9db8"))), smoothstep(0.14, 0.1, np.abs(river)))
     if rng.chance(0.3):

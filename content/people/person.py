@@ -301,16 +301,14 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
 def facts(seed: int, pose: str, phase: float) -> Facts:
     """Facts about the person of a seed, for labels."""
     person = draw_person(seed, pose, phase)
-    return Facts(
-        "child" if person.age_group == "child" else "adult",
-        {
-            "sex": person.sex,
-            "age_group": person.age_group,
-            "pose": person.pose,
-            "behaviour": BEHAVIOURS[person.pose],
-            "height_m": f"{person.height_m:.2f}",
-        },
-    )
+    attributes = {
+        "sex": person.sex,
+        "age_group": person.age_group,
+        "pose": person.pose,
+        "behaviour": BEHAVIOURS[person.pose],
+        "height_m": f"{person.height_m:.2f}",
+    }
+    return Facts("child" if person.age_group == "child" else "adult", attributes)
 
 
 def _drawn_age(rng: VariantRng) -> AgeGroup:

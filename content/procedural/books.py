@@ -39,9 +39,8 @@ def book(rng: VariantRng) -> Solid:
     inside = margin + board + bow
     block = rounded_box((length - 2 * margin, width - inside, thickness - 2 * board), 0.0003, 1)
     pages = block.painted(1).moved(y=0.5 * (board + bow - margin))
-    paper = asset_types.Material(
-        material_presets.jitter_color(material_presets.hex_to_linear("#e9e2cf"), 0.05, rng), 0.85
-    )
+    color = material_presets.jitter_color(material_presets.hex_to_linear("#e9e2cf"), 0.05, rng)
+    paper = asset_types.Material(color, 0.85)
     rough = wear.dulled(rng.between(0.25, 0.6), wear.draw_wear("book_cover", rng.seed))
     print_ = material_presets.printed_material(f"texture/book_cover?seed={rng.seed}", rough)
     half = (0.5 * length, 0.5 * width, 0.5 * thickness)

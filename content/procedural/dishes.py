@@ -149,9 +149,8 @@ def _fillings(width: Array, rng: VariantRng) -> tuple[list[Patch], list[Material
     ]:
         slot = len(tints)
         if layer == "lettuce":
-            made.append(
-                sheet(oval(1.02, 5), 0.0012, 9, 0.0035, rng).moved(z=z + 0.003).painted(slot)
-            )
+            part = sheet(oval(1.02, 5), 0.0012, 9, 0.0035, rng).moved(z=z + 0.003).painted(slot)
+            made.append(part)
             tints.append(plain_food(_GREENS, 0.4, rng))
             z += 0.004
         elif layer in ("cheese", "ham"):
@@ -201,9 +200,8 @@ def sliced_sandwich(seed: int, rng: VariantRng, *, half: bool = False) -> Dish:
     size, thick = rng.between(0.095, 0.12, "size_m"), rng.between(0.011, 0.015, "bread_m")
     outline = _slice_outline(size, rng)
     if half:
-        outline = size * np.array(
-            [[-0.5, -0.5], [0.5, -0.5], [0.5, -0.46], [-0.46, 0.5], [-0.5, 0.5]]
-        )
+        points = [[-0.5, -0.5], [0.5, -0.5], [0.5, -0.46], [-0.46, 0.5], [-0.5, 0.5]]
+        outline = size * np.array(points)
         outline = outline + 0.17 * size
     breads = ("toast",) if rng.chance(0.3) else ("bread",)
     materials = [
@@ -300,16 +298,13 @@ def make_pizza(seed: int, rng: VariantRng, radius: float, turn_rad: float) -> Di
     else:
         base = sector(crust, turn_rad, max(6, round(10 * turn_rad)), (0.0, 0.0))
     inner = radius - 0.8 * width
-    disc = shapes.fillet(
-        [
-            (0.0, thick - 0.002),
-            (inner, thick - 0.002),
-            (inner, thick + 0.0016),
-            (0.0, thick + 0.0022),
-        ],
-        [0.0, 0.0, 0.001, 0.0],
-        2,
-    )
+    corners = [
+        (0.0, thick - 0.002),
+        (inner, thick - 0.002),
+        (inner, thick + 0.0016),
+        (0.0, thick + 0.0022),
+    ]
+    disc = shapes.fillet(corners, [0.0, 0.0, 0.001, 0.0], 2)
     top = (
         shapes.lathe(disc, 56).painted(1)
         if whole
@@ -345,16 +340,15 @@ def _toppings(
     seed: int, radius: float, turn_rad: float, z: float, rng: VariantRng
 ) -> tuple[list[Patch], list[Material]]:
     """Slices, rings and leaves on a pizza, within its sector."""
-    drawn = rng.choose(
-        (
-            ("salami",),
-            ("salami", "olive"),
-            ("basil",),
-            ("mushroom", "pepper"),
-            ("basil", "olive"),
-            (),
-        )
+    options = (
+        ("salami",),
+        ("salami", "olive"),
+        ("basil",),
+        ("mushroom", "pepper"),
+        ("basil", "olive"),
+        (),
     )
+    drawn = rng.choose(options)
     made: list[Patch] = []
     tints: list[Material] = []
     for kind in drawn:
@@ -427,9 +421,8 @@ def pizza_slice(seed: int, rng: VariantRng) -> Dish:
     def place(points: Array) -> Array:
         c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
         spin = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        moved: Array = np.einsum("ij,...j->...i", spin, points) - np.array(
-            [0.55 * radius, 0.0, 0.0]
-        )
+        middle = np.array([0.55 * radius, 0.0, 0.0])
+        moved: Array = np.einsum("ij,...j->...i", spin, points) - middle
         return moved
 
     patches = [Patch(place(p.corners_m), p.uvs, p.slots) for p in dish.patches]
@@ -466,24 +459,18 @@ def _cake_piece(seed: int, rng: VariantRng, radius: float, turn_rad: float) -> D
         profile = [(0.0, low[1]), low, high, (0.0, high[1])]
         if not is_whole:
             patches.append(sector(profile, turn_rad, steps, (float(slot), float(slot))))
-    coat = shapes.fillet(
-        [
-            (0.0, -0.0 + height),
-            (radius - 0.0062, height),
-            (radius - 0.0062, 0.0),
-            (radius, 0.0),
-            (radius, height + 0.005),
-            (0.0, height + 0.005),
-        ],
-        [0.0, 0.0, 0.0, 0.0, 0.006, 0.0],
-        3,
-    )
+    corners = [
+        (0.0, -0.0 + height),
+        (radius - 0.0062, height),
+        (radius - 0.0062, 0.0),
+        (radius, 0.0),
+        (radius, height + 0.005),
+        (0.0, height + 0.005),
+    ]
+    coat = shapes.fillet(corners, [0.0, 0.0, 0.0, 0.0, 0.006, 0.0], 3)
     if is_whole:
-        solid = shapes.fillet(
-            [(0.0, 0.0), (radius, 0.0), (radius, height + 0.005), (0.0, height + 0.005)],
-            [0.0, 0.0, 0.006, 0.0],
-            4,
-        )
+        outline = [(0.0, 0.0), (radius, 0.0), (radius, height + 0.005), (0.0, height + 0.005)]
+        solid = shapes.fillet(outline, [0.0, 0.0, 0.006, 0.0], 4)
         patches.append(shapes.lathe(solid, 56).painted(0))
     else:
         patches.append(sector(coat, turn_rad, steps, (0.0, 0.0)))
@@ -550,9 +537,8 @@ def _cupcake(seed: int, rng: VariantRng) -> Dish:
     rim = rng.between(0.032, 0.037, "rim_m")
     high = rng.between(0.036, 0.044, "height_m")
     pleats = 28
-    profile = shapes.fillet(
-        [(0.0, 0.0), (foot, 0.0), (rim, high), (0.0, high + 0.003)], [0.0, 0.002, 0.002, 0.0], 2
-    )
+    outline = [(0.0, 0.0), (foot, 0.0), (rim, high), (0.0, high + 0.003)]
+    profile = shapes.fillet(outline, [0.0, 0.002, 0.002, 0.0], 2)
     cup = shapes.lathe(profile, 2 * pleats)
     corners = cup.corners_m.copy()
     turn = np.arctan2(corners[..., 1], corners[..., 0])

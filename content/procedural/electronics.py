@@ -241,11 +241,8 @@ def keyboard(rng: VariantRng) -> Solid:
         if flat
         else rng.between(0.014, 0.022, "thickness_m")
     )
-    case = shapes.extrude(
-        rounded_rectangle(depth, width, rng.choose((0.003, 0.007, 0.012), "radius_m")),
-        thick,
-        0.0015,
-    )
+    outline = rounded_rectangle(depth, width, rng.choose((0.003, 0.007, 0.012), "radius_m"))
+    case = shapes.extrude(outline, thick, 0.0015)
     caps = _key_caps(layout, pitch, 0.0022 if flat else rng.between(0.006, 0.009, "height_m"), rng)
     keys = caps.moved(-0.5 * depth + margin, -0.5 * width + margin, thick - 0.0008)
     slope = rng.between(0.0, 0.09, "slope")

@@ -109,9 +109,8 @@ def peg(diameter_m: float = 0.03, length_m: float = 0.09, color: str = "red") ->
         color: One of ``COLORS``.
     """
     r, z = 0.5 * diameter_m, length_m
-    body = shapes.lathe(
-        shapes.fillet([(0.0, 0.0), (r, 0.0), (r, z), (0.0, z)], 0.05 * diameter_m, 2), _SIDES
-    )
+    corners = [(0.0, 0.0), (r, 0.0), (r, z), (0.0, z)]
+    body = shapes.lathe(shapes.fillet(corners, 0.05 * diameter_m, 2), _SIDES)
     hull = hulls.frustum((r, 0.0), (r, z), _SIDES)
     return make_solid_in_place([body], (_paint("peg", color),), [hull])
 

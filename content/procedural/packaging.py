@@ -86,9 +86,8 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[surface_shapes.Poi
     dome = [(0.0, 0.009), (0.55 * r, 0.006), (0.72 * r, 0.0), (0.76 * r, 0.0), (r, 0.012), (r, z0)]
     taper = [(r, z1), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002), (rim, h)]
     lid = [(rim - 0.002, h), (rim - 0.0028, h - 0.005), (0.0, h - 0.005)]
-    top = surface_shapes.fillet(
-        [*taper, *lid], [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0], 2
-    )
+    corners = [*taper, *lid]
+    top = surface_shapes.fillet(corners, [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0], 2)
     split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
     patches = [
         surface_shapes.lathe(

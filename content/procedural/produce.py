@@ -106,11 +106,8 @@ def _stalk(places: Array, rng: VariantRng) -> tuple[Patch, list[Patch]]:
     for place in places[:: max(1, len(places) // 14)]:
         foot = path[int(np.argmin(((path - place) ** 2).sum(axis=1)))]
         if math.dist(foot, place) > 0.004:
-            twigs.append(
-                shapes.sweep(
-                    np.linspace(foot, place, 4), shapes.circle(0.001, 5), up=(0.3, 0.5, 0.81)
-                )
-            )
+            line = np.linspace(foot, place, 4)
+            twigs.append(shapes.sweep(line, shapes.circle(0.001, 5), up=(0.3, 0.5, 0.81)))
     return main, twigs
 
 
@@ -135,11 +132,8 @@ def broccoli(rng: VariantRng) -> Solid:
         way = np.array(
             [math.sin(lean) * math.cos(angle), math.sin(lean) * math.sin(angle), math.cos(lean)]
         )
-        tip = (
-            way
-            * np.array([radius - 0.6 * size, radius - 0.6 * size, high])
-            * rng.between(0.93, 1.07)
-        )
+        reach = np.array([radius - 0.6 * size, radius - 0.6 * size, high])
+        tip = way * reach * rng.between(0.93, 1.07)
         florets.append(
             _floret(size * rng.between(0.9, 1.15), way, rng).moved(
                 float(tip[0]), float(tip[1]), float(tip[2]) + rise
@@ -149,20 +143,14 @@ def broccoli(rng: VariantRng) -> Solid:
         path = np.linspace(foot, tip + np.array([0.0, 0.0, rise - 0.1 * size]), 3)
         arms.append(shapes.sweep(path, shapes.circle(0.3 * size, 6), up=(0.6, 0.8, 0.0)))
     girth = radius * (0.32 if is_head else 0.28)
-    trunk = shapes.lathe(
-        shapes.fillet(
-            [
-                (0.0, 0.0),
-                (0.9 * girth, 0.0),
-                (girth, 0.35 * rise),
-                (1.3 * girth, 0.9 * rise),
-                (0.0, 1.1 * rise),
-            ],
-            [0.0, 0.003, 0.01, 0.01, 0.0],
-            3,
-        ),
-        18,
-    )
+    corners = [
+        (0.0, 0.0),
+        (0.9 * girth, 0.0),
+        (girth, 0.35 * rise),
+        (1.3 * girth, 0.9 * rise),
+        (0.0, 1.1 * rise),
+    ]
+    trunk = shapes.lathe(shapes.fillet(corners, [0.0, 0.003, 0.01, 0.01, 0.0], 3), 18)
     crown = join_patches(florets).painted(0)
     stalk = join_patches([trunk, *arms]).painted(1)
     materials = [

@@ -360,9 +360,8 @@ def plate_facts(seed: int) -> Facts:
 
 
 def _plate_decor(seed: int) -> str:
-    return variant_rng("plate/decor", seed).choose(
-        ("plain", "plain", "plain", "bands", "rim", "willow", "motif", "speckled")
-    )
+    options = ("plain", "plain", "plain", "bands", "rim", "willow", "motif", "speckled")
+    return variant_rng("plate/decor", seed).choose(options)
 
 
 def plate_symmetries(seed: int) -> tuple[Symmetry, ...]:

@@ -103,9 +103,8 @@ def wrench(rng: VariantRng) -> Solid:
          (length - 1.75 * head, 0.85 * bar), (0.6 * ring, bar)]
     )  # fmt: skip
     bevel = 0.12 * thick
-    eye = shapes.extrude(
-        shapes.circle(ring, 32), 1.3 * thick, bevel, [shapes.circle(0.57 * across, 24)]
-    )
+    outline = shapes.circle(ring, 32)
+    eye = shapes.extrude(outline, 1.3 * thick, bevel, [shapes.circle(0.57 * across, 24)])
     patches = [
         shapes.extrude(_turn_jaw(_jaw(across, head)) + centre, thick, bevel).moved(z=-0.5 * thick),
         shapes.extrude(shank, 0.8 * thick, 0.3 * thick).moved(z=-0.4 * thick),

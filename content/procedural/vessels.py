@@ -135,9 +135,8 @@ def draw_walls(style: VesselStyle, rng: VariantRng) -> Walls:
     lift = 0.0015 if style.floor_share == 0.0 else 0.0006
     under = [(0.0, lift), (0.78 * foot, lift), (0.8 * foot, 0.0)]
     rounding = min(arc, 0.3 * foot, 0.007)
-    line = shapes.fillet(
-        [*under, *knots], [0.0, 0.0, 0.0, rounding, *[arc] * (len(knots) - 2), 0.0], 4
-    )
+    corners = [*under, *knots]
+    line = shapes.fillet(corners, [0.0, 0.0, 0.0, rounding, *[arc] * (len(knots) - 2), 0.0], 4)
     base, outer = line[:3], line[3:]
     if style.floor_share:
         floor = style.floor_share * height

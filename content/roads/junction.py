@@ -85,9 +85,8 @@ def corner_patches(shape: ArmsShape, number: int, slots: dict[str, int]) -> Iter
     )  # fmt: skip
     for end in (0, -1):
         inner, outer = corner(shape, number, 0.02)[end], corner(shape, number, shape.border_m)[end]
-        points = np.array(
-            [[[*inner, -0.2], [*outer, -0.2]], [[*inner, top], [*outer, shape.edge_z_m]]]
-        )
+        corners = [[[*inner, -0.2], [*outer, -0.2]], [[*inner, top], [*outer, shape.edge_z_m]]]
+        points = np.array(corners)
         plan = points[..., [0, 2]] + points[..., [1, 1]] * np.array([1.0, 0.0])
         yield surface(points, plan, "kerb", slots["kerb"])
 

@@ -49,9 +49,8 @@ def pram(rng: VariantRng) -> Solid:
             parts += [part.moved(x, y, size) for part in _wheel(size)]
         parts.append(rod([(front, y, 0.8 * r), (-0.1, y, 0.55), (-0.48, y, grip)], 0.013, 6))
         parts.append(rod([(rear, y, r), (0.12, y, 0.52)], 0.012, 6))
-    parts.append(
-        rod([(-0.48, -wide, grip), (-0.52, 0.0, grip + 0.02), (-0.48, wide, grip)], 0.017, 6, 3)
-    )
+    piece = rod([(-0.48, -wide, grip), (-0.52, 0.0, grip + 0.02), (-0.48, wide, grip)], 0.017, 6, 3)
+    parts.append(piece)
     parts.append(bar((rear, -wide, r), (rear, wide, r), 0.01, 5))
     basket = Rectangle(-0.28, 0.2, -wide + 0.06, wide - 0.06)
     parts.append(hopper(basket, Rectangle(-0.32, 0.24, -wide + 0.03, wide - 0.03), (0.16, 0.3), 3))
@@ -148,9 +147,8 @@ def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:
     top = foot + high
     drawn = top + (0.42 if rng.chance(0.6) else 0.03)
     x, y = -0.3 * deep, 0.26 * wide
-    parts.append(
-        rod([(x, -y, top - 0.02), (x, -y, drawn), (x, y, drawn), (x, y, top - 0.02)], 0.011, 5, 1)
-    )
+    path = [(x, -y, top - 0.02), (x, -y, drawn), (x, y, drawn), (x, y, top - 0.02)]
+    parts.append(rod(path, 0.011, 5, 1))
     grip = [
         (0.05, -0.08, top),
         (0.05, -0.06, top + 0.035),

@@ -76,13 +76,11 @@ def cafe_set(seed: int) -> Solid:
 
 def cafe_set_facts(seed: int) -> Facts:
     """Kind of its chairs, and whether it has a parasol."""
-    return Facts(
-        "cafe_set",
-        {
-            "chairs": variant_rng("cafe_set", seed).turn(CHAIRS, "chairs"),
-            "parasol": "yes" if _has_parasol(seed) else "no",
-        },
-    )
+    attributes = {
+        "chairs": variant_rng("cafe_set", seed).turn(CHAIRS, "chairs"),
+        "parasol": "yes" if _has_parasol(seed) else "no",
+    }
+    return Facts("cafe_set", attributes)
 
 
 def _has_parasol(seed: int) -> bool:

@@ -29,9 +29,8 @@ def airframe(seed: int) -> Solid:
         parts.append(post(0.016, (0.0, 0.045), (x, y, 0.0), 12).painted(1))
         # Rotors at speed are a blur: a thin disc as the eye sees it is not drawn, blades are.
         blade = block((-0.09, -0.009, 0.047), (0.09, 0.009, 0.049))
-        parts.append(
-            blade.rotated("z", angle + rng.between(0.0, math.pi)).moved(x, y, 0.0).painted(1)
-        )
+        piece = blade.rotated("z", angle + rng.between(0.0, math.pi)).moved(x, y, 0.0).painted(1)
+        parts.append(piece)
     paints = (painted_material(PAINTS[seed % len(PAINTS)], 0.4), painted_material("#1d1e20", 0.5))
     standing = [part.moved(0.0, 0.0, 0.03) for part in parts]
     return make_solid(standing, paints, [hulls.box((-reach, -reach, 0.0), (reach, reach, 0.08))])

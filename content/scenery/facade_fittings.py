@@ -72,9 +72,8 @@ def flower_box(y_m: Span, z: float, x: float, rng: VariantRng) -> Patch:
     for k in range(count):
         y = y0 + (y1 - y0) * (k + rng.between(0.3, 0.7)) / count
         r, up = rng.between(0.08, 0.14), rng.between(0.1, 0.26)
-        tufts.append(
-            _tuft(x + 0.5 * d, y, z, (r, up)).painted(FLOWER if rng.chance(0.4) else PLANT)
-        )
+        tuft = _tuft(x + 0.5 * d, y, z, (r, up)).painted(FLOWER if rng.chance(0.4) else PLANT)
+        tufts.append(tuft)
     return join_patches([box, *tufts])
 
 
@@ -106,9 +105,8 @@ def balcony_things(y_m: Span, z0: float, out_m: float, rng: VariantRng) -> list[
             slot, z = rng.choose((WHITE, ACCENT, FLOWER, AWNING)), z0 + 1.5
             face = rectangles(0.75 * out_m, [(y, y + 0.28, z - long, z)], slot)
             parts += [face, face.flipped().moved(x=-0.004)]
-        parts.append(
-            ledges([(0.75 * out_m, 0.75 * out_m + 0.01, y0, y1, z0 + 1.5, z0 + 1.51)], DARK)
-        )
+        part = ledges([(0.75 * out_m, 0.75 * out_m + 0.01, y0, y1, z0 + 1.5, z0 + 1.51)], DARK)
+        parts.append(part)
     elif kind == "parasol":
         x, y, z = 0.55 * out_m, 0.5 * (y0 + y1), z0 + 2.15
         cloth = lathe([(0.75, z - 0.3), (0.0, z)], 8, rng.choose((AWNING, ACCENT, WHITE)))

@@ -95,9 +95,8 @@ def power_pylon(seed: int, span_m: float) -> Solid:
     parts = list(_mast(widths))
     for x in (-foot, foot):
         for y in (-foot, foot):
-            parts.append(
-                surface_shapes.block((x - 0.4, y - 0.4, 0.0), (x + 0.4, y + 0.4, 0.35), 0.0, 1)
-            )
+            part = surface_shapes.block((x - 0.4, y - 0.4, 0.0), (x + 0.4, y + 0.4, 0.35), 0.0, 1)
+            parts.append(part)
     grips: list[se3.Vec3] = []
     for share, reach in _ARMS[kind]:
         z, half = share * high, float(np.interp(share * high, widths[:, 0], widths[:, 1]))

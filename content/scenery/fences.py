@@ -69,9 +69,8 @@ def garden_wall(seed: int, style: str) -> Solid:
         wide, tall = half + 0.07, high + (0.75 if railed else 0.2)
         pier = (-HALF_M, -HALF_M + 2.0 * wide)
         parts.append(block((-wide, pier[0], 0.0), (wide, pier[1], tall - 0.08)))
-        parts.append(
-            block((-wide - 0.03, pier[0], tall - 0.08), (wide + 0.03, pier[1], tall), 0.015, 1)
-        )
+        part = block((-wide - 0.03, pier[0], tall - 0.08), (wide + 0.03, pier[1], tall), 0.015, 1)
+        parts.append(part)
         top = tall
     if railed:
         parts += _railing(high, 0.6, rng)

@@ -49,9 +49,8 @@ def shed(seed: int) -> Solid:
     wide = rng.between(1.8, 4.5, "width_m")
     deep = rng.between(1.8, 3.4, "depth_m")
     high = rng.between(1.95, 2.4, "height_m")
-    plan = draw_design(
-        rng.choose(("farmhouse", "warehouse", "house")), seed + int(40 * rng.random())
-    )
+    options = ("farmhouse", "warehouse", "house")
+    plan = draw_design(rng.choose(options), seed + int(40 * rng.random()))
     half = 0.5 * wide
     door = rng.between(-half + 0.15, half - 1.05)
     holes = [Opening((door, door + 0.85), (0.06, 1.85), 0.06)]

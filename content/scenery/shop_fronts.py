@@ -132,9 +132,8 @@ def _boards(shop: Premises, free_m: Span, rng: VariantRng) -> list[Patch]:
     low, high = shop.top_m + 0.1, shop.ground_m - 0.12
     long = min(free_m[1] - free_m[0], 4.0 * (high - low), rng.between(2.4, 6.0))
     tall = min(high - low, 0.25 * long)
-    middle = 0.5 * (free_m[0] + free_m[1]) + rng.choose((-0.5, 0.0, 0.0, 0.5)) * (
-        free_m[1] - free_m[0] - long
-    )
+    options = (-0.5, 0.0, 0.0, 0.5)
+    middle = 0.5 * (free_m[0] + free_m[1]) + rng.choose(options) * (free_m[1] - free_m[0] - long)
     image = (0.0, 1.0, shop.board / BOARDS, (shop.board + 1.0) / BOARDS)
     parts = []
     if rng.chance(0.5):

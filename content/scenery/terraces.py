@@ -140,9 +140,8 @@ def terrace_facts(seed: int) -> Facts:
 def _pavement(kind: str, rng: VariantRng) -> Material:
     if kind == "deck":
         wood = rng.choose(((0.75, 0.66, 0.58), (0.9, 0.85, 0.8), (0.6, 0.5, 0.42)))
-        return patterned_material(
-            f"texture/wood_planks?seed={rng.choose((0, 1, 2))}", 1.2, 0.8, wood
-        )
+        texture = f"texture/wood_planks?seed={rng.choose((0, 1, 2))}"
+        return patterned_material(texture, 1.2, 0.8, wood)
     return rng.choose((
         patterned_material("texture/paving?seed=1", 1.6, 0.9),
         patterned_material("texture/paving?seed=2", 1.6, 0.9),

@@ -113,9 +113,8 @@ def _big_bin(d: float, w: float, h: float, state: str) -> list[Patch]:
             at = (k - 1) * 0.22 * w
             low = (0.39 * d * side, at, foot_z + 0.05)
             parts.append(bar(low, (0.46 * d * side, at, top), 0.025, 4))
-        parts.append(
-            bar((-0.25, side * (y + 0.02), 0.98), (0.25, side * (y + 0.02), 0.98), 0.02, 6, 3)
-        )
+        part = bar((-0.25, side * (y + 0.02), 0.98), (0.25, side * (y + 0.02), 0.98), 0.02, 6, 3)
+        parts.append(part)
         for front in (-0.3, 0.3):
             tyre = cone((0.1, -0.025), (0.1, 0.025), 12, 2).rotated("x", 0.5 * math.pi)
             parts.append(tyre.moved(front * d, side * 0.33 * w, 0.1))
@@ -202,12 +201,10 @@ def skip_container(rng: VariantRng) -> Solid:
         for y in (-0.6 * half, 0.6 * half):
             pin = cone((0.05, 0.0), (0.05, 0.12), 8).rotated("y", sign * 0.5 * math.pi)
             parts.append(pin.moved(sign * wide, y, 0.75 * high))
-            parts.append(
-                bar((sign * (wide + 0.02), y, 0.12), (sign * (wide + 0.02), y, high), 0.04)
-            )
-        parts.append(
-            block((sign * wide * 0.8 - 0.06, -half, 0.0), (sign * wide * 0.8 + 0.06, half, 0.13))
-        )
+            piece = bar((sign * (wide + 0.02), y, 0.12), (sign * (wide + 0.02), y, high), 0.04)
+            parts.append(piece)
+        part = block((sign * wide * 0.8 - 0.06, -half, 0.0), (sign * wide * 0.8 + 0.06, half, 0.13))
+        parts.append(part)
         for y in (-top_half + 0.1, top_half - 0.1):
             mark = block((-0.012, -0.07, high - 0.3), (0.012, 0.07, high - 0.1), 0.0, 4)
             parts.append(mark.moved(sign * wide, y))

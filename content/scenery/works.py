@@ -281,9 +281,8 @@ def scaffold(rng: VariantRng) -> Solid:
         for x in (x0 + 0.03, x0 + 0.38):
             parts.append(surfaces.block((x, -half, z - 0.03), (x + 0.32, half, z + 0.01), 0.0, 1))
         parts += [clutter.bar((x1, -half, z + h), (x1, half, z + h), 0.017, 5) for h in (0.5, 1.0)]
-        parts.append(
-            surfaces.block((x1 - 0.03, -half, z + 0.01), (x1 - 0.005, half, z + 0.16), 0.0, 2)
-        )
+        part = surfaces.block((x1 - 0.03, -half, z + 0.01), (x1 - 0.005, half, z + 0.16), 0.0, 2)
+        parts.append(part)
     for k in range(lifts):
         if k % 2 == rng.seed % 2:
             low, high = 2.0 * k + 0.1, 2.0 * k + 1.9
@@ -307,11 +306,7 @@ def scaffold(rng: VariantRng) -> Solid:
 
 def scaffold_facts(seed: int) -> Facts:
     """Whether it carries netting."""
-    return Facts(
-        "scaffold",
-        {
-            "netting": "yes"
-            if variant_rng("scaffold", seed).turn((False, True), "netting")
-            else "no"
-        },
-    )
+    attributes = {
+        "netting": "yes" if variant_rng("scaffold", seed).turn((False, True), "netting") else "no"
+    }
+    return Facts("scaffold", attributes)

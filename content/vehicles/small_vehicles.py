@@ -97,8 +97,7 @@ def _hoop() -> Patch:
 def _rack(count: int) -> list[Patch]:
     """Loops that hold front wheels, on two rails along Y."""
     half, parts = 0.275 * count + 0.15, []
-    for x in (0.35, 0.85):
-        parts.append(bar((x, -half, 0.03), (x, half, 0.03), 0.02))
+    parts += [bar((x, -half, 0.03), (x, half, 0.03), 0.02) for x in (0.35, 0.85)]
     for k in range(count):
         y = (k - 0.5 * (count - 1)) * 0.55
         for side in (-0.045, 0.045):
@@ -171,15 +170,14 @@ def trailer(rng: VariantRng) -> Solid:
     reach = half + 1.15
     parts: list[Patch] = []
     for side in (-1.0, 1.0):
-        parts.append(
-            bar(
-                (reach - 0.1, 0.0, floor - 0.06),
-                (half - 0.4, side * 0.9 * wide, floor - 0.06),
-                0.035,
-                4,
-                6,
-            )
+        part = bar(
+            (reach - 0.1, 0.0, floor - 0.06),
+            (half - 0.4, side * 0.9 * wide, floor - 0.06),
+            0.035,
+            4,
+            6,
         )
+        parts.append(part)
         made = _paint_wheel(wheels.wheel(0.29, 0.16, "steel"))
         placed = made if side > 0 else made.rotated("z", math.pi)
         parts.append(placed.moved(-0.1, side * (wide + 0.12), 0.29))
@@ -221,9 +219,8 @@ def trailer(rng: VariantRng) -> Solid:
             "texture/wood_planks?seed=2", 1.2, 0.8, (0.55, 0.5, 0.45)
         ),
     )
-    return make_solid(
-        on_ground(parts), materials, [hulls.box((-half, -wide, 0.2), (half, wide, floor + 0.4))]
-    )
+    shells = [hulls.box((-half, -wide, 0.2), (half, wide, floor + 0.4))]
+    return make_solid(on_ground(parts), materials, shells)
 
 
 def trailer_facts(seed: int) -> Facts:

@@ -107,9 +107,8 @@ def _roof(half: float, x: float, joints: list[float], rng: VariantRng) -> list[P
         low, high = start + 0.5, end - 0.5
         top = _TOP_M + rng.between(0.18, 0.34)
         reach = half - rng.between(0.2, 0.35)
-        parts.append(
-            block((low, -reach, _TOP_M - 0.06), (high, reach, top), 0.05, Slot.SECOND_PAINT)
-        )
+        part = block((low, -reach, _TOP_M - 0.06), (high, reach, top), 0.05, Slot.SECOND_PAINT)
+        parts.append(part)
     return parts
 
 

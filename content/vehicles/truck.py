@@ -140,9 +140,8 @@ def _load(x: float, cab: float, top: float) -> list[Patch]:
             parts.append(block((-x, y - 0.025, z), (front, y + 0.025, z + 0.07), 0.0, Slot.CHROME))
         parts.append(block((-x, y - 0.025, 0.98), (-x + 0.08, y + 0.025, top), 0.0, Slot.CHROME))
     for y in (-0.62, -0.1, 0.1, 0.62):
-        parts.append(
-            block((-x, y - 0.015, 1.05), (-x + 0.04, y + 0.015, top - 0.1), 0.0, Slot.CHROME)
-        )
+        part = block((-x, y - 0.015, 1.05), (-x + 0.04, y + 0.015, top - 0.1), 0.0, Slot.CHROME)
+        parts.append(part)
     parts.append(block((-x + 0.02, -0.006, 1.05), (-x + 0.04, 0.006, top - 0.1), 0.0, Slot.TRIM))
     return parts
 

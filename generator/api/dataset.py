@@ -86,11 +86,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         return Sample(self._source.sample(number))
 
     def __len__(self) -> int:
-        """Number of samples.
-
-        Raises:
-            TypeError: the data set has no size.
-        """
+        """Number of samples. Raises TypeError if the data set has no size."""
         if not self.is_bounded:
             raise TypeError("a data set without a size has no length; give n=, or take a slice")
         return len(self._indices)

@@ -25,11 +25,7 @@ def preset_path(package: str, name: str) -> Path:
 
 @cache
 def load_preset(package: str, name: str, kind: type[M]) -> M:
-    """Read and validate a preset.
-
-    Raises:
-        ConfigError: there is no such file, or it is invalid.
-    """
+    """Read and validate a preset. Raises ConfigError if there is no such file, or it is invalid."""
     try:
         check_preset(package, name)
     except ValueError as error:

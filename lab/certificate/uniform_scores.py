@@ -19,23 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.config.distributions import (
-    AboutZ,
-    Box,
-    Cap,
-    Choice,
-    Constant,
-    Distribution,
-    LogUniform,
-    Mixture,
-    Normal,
-    Probability,
-    Shell,
-    So3,
-    Sphere,
-    Uniform,
-    UniformInteger,
-)
+from gen_data.config import distributions
 from gen_data.core.streams import Rng
 
 ROUNDING = 1e-9
@@ -44,7 +28,9 @@ ROUNDING = 1e-9
 Scores = tuple[float, ...]
 
 
-def uniform_scores(distribution: Distribution[Any], value: Any, rng: Rng) -> Scores | None:
+def uniform_scores(
+    distribution: distributions.Distribution[Any], value: Any, rng: Rng
+) -> Scores | None:
     """Scores of one drawn value, each uniform in [0, 1] if it follows the distribution.
 
     Args:
@@ -75,19 +61,19 @@ def _fixed(expected: float, value: float) -> Scores:
     return () if math.isclose(value, expected, rel_tol=1e-9, abs_tol=1e-12) else (math.nan,)
 
 
-def _uniform(d: Uniform, value: float, rng: Rng) -> Scores:
+def _uniform(d: distributions.Uniform, value: float, rng: Rng) -> Scores:
     del rng
     return (_interval(d.low, d.high, value),) if d.high > d.low else _fixed(d.low, value)
 
 
-def _log_uniform(d: LogUniform, value: float, rng: Rng) -> Scores:
+def _log_uniform(d: distributions.LogUniform, value: float, rng: Rng) -> Scores:
     del rng
     if d.low == d.high:
         return _fixed(d.low, value)
     return (_interval(math.log(d.low), math.log(d.high), math.log(value)),)
 
 
-def _normal(d: Normal, value: float, rng: Rng) -> Scores:
+def _normal(d: distributions.Normal, value: float, rng: Rng) -> Scores:
     from scipy import stats
 
     del rng
@@ -100,7 +86,7 @@ def _normal(d: Normal, value: float, rng: Rng) -> Scores:
     return (float(stats.truncnorm.cdf((value - d.center) / d.stddev, a, b)),)
 
 
-def _uniform_integer(d: UniformInteger, value: int, rng: Rng) -> Scores:
+def _uniform_integer(d: distributions.UniformInteger, value: int, rng: Rng) -> Scores:
     if value != int(value):
         return (math.nan,)
     if d.low == d.high:
@@ -110,7 +96,7 @@ def _uniform_integer(d: UniformInteger, value: int, rng: Rng) -> Scores:
     return ((value - d.low + rng.random()) / (d.high - d.low + 1),)
 
 
-def _mixture(d: Mixture[Any], value: float, rng: Rng) -> Scores:
+def _mixture(d: distributions.Mixture[Any], value: float, rng: Rng) -> Scores:
     """The weighted mean of the parts' scores, whose steps are spread by one number.
 
     Empty if a part is of another kind than below, such as a choice.
@@ -119,7 +105,16 @@ def _mixture(d: Mixture[Any], value: float, rng: Rng) -> Scores:
     same: Any = SimpleNamespace(random=lambda: spread)
     score, is_possible = 0.0, False
     for part, weight in zip(d.parts, d.weights, strict=True):
-        if not isinstance(part, (Constant, LogUniform, Normal, Uniform, UniformInteger)):
+        if not isinstance(
+            part,
+            (
+                distributions.Constant,
+                distributions.LogUniform,
+                distributions.Normal,
+                distributions.Uniform,
+                distributions.UniformInteger,
+            ),
+        ):
             return ()
         low, high = part.support()
         if weight > 0.0 and low <= value <= high:
@@ -130,14 +125,14 @@ def _mixture(d: Mixture[Any], value: float, rng: Rng) -> Scores:
     return (score / sum(d.weights),) if is_possible else (math.nan,)
 
 
-def _choice(d: Choice[Any], value: Any, rng: Rng) -> Scores:
+def _choice(d: distributions.Choice[Any], value: Any, rng: Rng) -> Scores:
     weights: dict[Any, float] = {}
     for possible, weight in zip(d.values, d.weights, strict=True):
         weights[possible] = weights.get(possible, 0.0) + weight
     return _of_weights(weights, value, rng)
 
 
-def _probability(d: Probability, value: bool, rng: Rng) -> Scores:
+def _probability(d: distributions.Probability, value: bool, rng: Rng) -> Scores:
     return _of_weights({False: 1.0 - d.p, True: d.p}, value, rng)
 
 
@@ -156,14 +151,14 @@ def _turn(sine: float, cosine: float) -> float:
     return math.atan2(sine, cosine) / (2.0 * math.pi) % 1.0
 
 
-def _so3(d: So3, value: Sequence[float], rng: Rng) -> Scores:
+def _so3(d: distributions.So3, value: Sequence[float], rng: Rng) -> Scores:
     """Hopf coordinates: a uniform point of the sphere in four dimensions has uniform ones."""
     del d, rng
     w, x, y, z = value
     return (w * w + z * z, _turn(z, w), _turn(x, y))
 
 
-def _about_z(d: AboutZ, value: Sequence[float], rng: Rng) -> Scores:
+def _about_z(d: distributions.AboutZ, value: Sequence[float], rng: Rng) -> Scores:
     del rng
     w, x, y, z = value
     low, high = (math.radians(angle) for angle in d.yaw_deg)
@@ -177,12 +172,12 @@ def _about_z(d: AboutZ, value: Sequence[float], rng: Rng) -> Scores:
     return (0.0 if 2.0 * math.pi - beyond < ROUNDING else share,)
 
 
-def _sphere(d: Sphere, value: Sequence[float], rng: Rng) -> Scores:
+def _sphere(d: distributions.Sphere, value: Sequence[float], rng: Rng) -> Scores:
     del d, rng
     return _around_z(value, -1.0, 1.0)
 
 
-def _cap(d: Cap, value: Sequence[float], rng: Rng) -> Scores:
+def _cap(d: distributions.Cap, value: Sequence[float], rng: Rng) -> Scores:
     del rng
     axis = np.array(d.axis)
     # Any vector across the axis: azimuths are uniform from wherever they are counted.
@@ -192,7 +187,7 @@ def _cap(d: Cap, value: Sequence[float], rng: Rng) -> Scores:
     return _around_z(frame @ np.array(value), math.cos(math.radians(d.half_angle_deg)), 1.0)
 
 
-def _shell(d: Shell, value: Sequence[float], rng: Rng) -> Scores:
+def _shell(d: distributions.Shell, value: Sequence[float], rng: Rng) -> Scores:
     del rng
     away = np.array(value) - np.array(d.center_m)
     radius_m = float(np.linalg.norm(away))
@@ -211,24 +206,24 @@ def _around_z(direction: Sequence[float], low: float, high: float) -> Scores:
     return (*heights, _turn(y, x))
 
 
-def _box(d: Box, value: Sequence[float], rng: Rng) -> Scores:
+def _box(d: distributions.Box, value: Sequence[float], rng: Rng) -> Scores:
     del rng
     sides = zip(d.low_m, d.high_m, value, strict=True)
     return tuple(_interval(low, high, v) for low, high, v in sides if high > low)
 
 
 _TRANSFORMS: Mapping[type[Any], Callable[[Any, Any, Rng], Scores]] = {
-    AboutZ: _about_z,
-    Box: _box,
-    Cap: _cap,
-    Choice: _choice,
-    LogUniform: _log_uniform,
-    Mixture: _mixture,
-    Normal: _normal,
-    Probability: _probability,
-    Shell: _shell,
-    So3: _so3,
-    Sphere: _sphere,
-    Uniform: _uniform,
-    UniformInteger: _uniform_integer,
+    distributions.AboutZ: _about_z,
+    distributions.Box: _box,
+    distributions.Cap: _cap,
+    distributions.Choice: _choice,
+    distributions.LogUniform: _log_uniform,
+    distributions.Mixture: _mixture,
+    distributions.Normal: _normal,
+    distributions.Probability: _probability,
+    distributions.Shell: _shell,
+    distributions.So3: _so3,
+    distributions.Sphere: _sphere,
+    distributions.Uniform: _uniform,
+    distributions.UniformInteger: _uniform_integer,
 }

@@ -155,9 +155,8 @@ def test_bop_models_state_the_files_origin(folder: Path) -> None:
     from gen_data.exporters.rigid_models import Piece, build_model
 
     for origin, offset, low in (("center", [-500, -500, 0], -500), ("file", [0, 0, 0], 0)):
-        (folder / "assets.yaml").write_text(
-            json.dumps({"assets": [{"file": "a.obj", "id": f"a_{origin}", "origin": origin}]})
-        )
+        text = json.dumps({"assets": [{"file": "a.obj", "id": f"a_{origin}", "origin": origin}]})
+        (folder / "assets.yaml").write_text(text)
         model = build_model([Piece(f"user/a_{origin}", 1.0, IDENTITY)], opened(folder))
         assert model.info["file_origin_mm"] == offset
         assert float(model.vertices["x"].min()) == low

@@ -69,12 +69,10 @@ def test_tools_point_out_of_the_flange_and_close_at_the_grasp(library: Library, 
     poses = link_poses(robot, closed)
     T_grasp_world = (poses[gripper.link] @ gripper.T_link_grasp).inverse()
     tips = [link for link in robot.links if link.endswith("finger")] or [gripper.link]
-    points = np.concatenate(
-        [
-            (T_grasp_world @ poses[tip]).apply(library.mesh(f"{name}/{tip}").vertices_m)
-            for tip in tips
-        ]
-    )
+    parts = [
+        (T_grasp_world @ poses[tip]).apply(library.mesh(f"{name}/{tip}").vertices_m) for tip in tips
+    ]
+    points = np.concatenate(parts)
     if gripper.cup is not None:
         rim = points[points[:, 2] > -1e-6]
         assert points[:, 2].max() == pytest.approx(0.0, abs=1e-6)

@@ -82,9 +82,8 @@ def test_sizes_and_creators_come_from_the_package(tmp_path: Path) -> None:
     """Centimetres in Latin-1 properties; the licence by the zip."""
     for name in ("Scopia.sh3f", "BlendSwap-CC-0.sh3f"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "PluginFurnitureCatalog.properties").write_bytes(
-            FACTS.replace("things", name[:3]).encode("latin-1")
-        )
+        data = FACTS.replace("things", name[:3]).encode("latin-1")
+        (tmp_path / name / "PluginFurnitureCatalog.properties").write_bytes(data)
     models = sweethome3d.read_models(tmp_path)
     assert models["Sco/box/box.obj"].size_m == (0.2, 0.1, 0.4)
     assert models["Sco/box/box.obj"].creator == "A. Modeller"

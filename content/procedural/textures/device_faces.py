@@ -116,11 +116,8 @@ def _map(rng: VariantRng) -> Image:
         turn, reach = rng.choose((0.3, 1.87)) + rng.between(-0.1, 0.1), 500.0
         step = (reach * math.cos(turn), reach * math.sin(turn))
         ends = [(a[0] - step[0], a[1] - step[1]), (a[0] + step[0], a[1] + step[1])]
-        pen.line(
-            ends,
-            fill=rng.choose(((255, 255, 255), (255, 255, 255), (252, 214, 164))),
-            width=rng.choose((5, 9)),
-        )
+        options = ((255, 255, 255), (255, 255, 255), (252, 214, 164))
+        pen.line(ends, fill=rng.choose(options), width=rng.choose((5, 9)))
     route = [(140.0, 560.0), (150.0, 420.0), (90.0, 300.0), (190.0, 120.0)]
     pen.line(route, fill=(66, 133, 244), width=8)
     pen.ellipse([180, 106, 204, 130], fill=(219, 68, 55))

@@ -76,9 +76,8 @@ def granite(rng: VariantRng) -> TextureData:
     feldspar = smoothstep(0.5, 0.75, kind + crowding)
     specks = mica.of_each((uniform(mica.count, rng) < 0.14).astype(np.float64))
     specks = specks * smoothstep(0.75, 0.45, mica.nearest)
-    albedo = mix_colors(
-        np.broadcast_to(ground, (SIZE_PX, SIZE_PX, 3)), other, strength * 0.8 * feldspar
-    )
+    color = np.broadcast_to(ground, (SIZE_PX, SIZE_PX, 3))
+    albedo = mix_colors(color, other, strength * 0.8 * feldspar)
     albedo = mix_colors(albedo, dark, strength * 0.8 * specks)
     return texture(albedo + 0.012 * (kind - 0.5)[..., None], 0.95 + 0.05 * specks)
 

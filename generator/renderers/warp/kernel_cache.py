@@ -95,11 +95,7 @@ def no_private_folder() -> Iterator[None]:
 
 
 def require_space(folder: Path) -> None:
-    """Refuse a disk that the compiler would fill.
-
-    Raises:
-        OSError: as from a full disk.
-    """
+    """Refuse a disk that the compiler would fill. Raises OSError as from a full disk."""
     if shutil.disk_usage(folder).free < NEED_BYTES:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
 

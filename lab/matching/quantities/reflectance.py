@@ -9,12 +9,7 @@ import math
 import numpy as np
 
 from gen_data.lab.matching import indirect_inference, recordings
-from gen_data.lab.matching.quantities.base import (
-    LidarQuantity,
-    power_of_two,
-    round_digits,
-    with_model,
-)
+from gen_data.lab.matching.quantities import base
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 
@@ -30,12 +25,12 @@ def _start(sensor: LidarSensor) -> float:
 
 
 def _apply(sensor: LidarSensor, coordinate: float) -> LidarSensor:
-    return with_model(sensor, white_intensity=round_digits(2.0**coordinate))
+    return base.with_model(sensor, white_intensity=base.round_digits(2.0**coordinate))
 
 
-REFLECTANCE = LidarQuantity(
+REFLECTANCE = base.LidarQuantity(
     "reflectance gain", "intensity of white", "log2 of mean intensity of the middle half",
     "model.white_intensity", measure, _start, _apply,
     indirect_inference.Axis(-7.0, 0.0, step=0.3, plausible=1.5, enough=0.1, varies=False),
-    to_value=power_of_two,
+    to_value=base.power_of_two,
 )  # fmt: skip
