@@ -60,11 +60,7 @@ def annotate_ego(
 
     ``scenes`` are as in ``FrameAnnotator``. Annotators of sequences add their fields later.
     """
-    whole = (
-        interfaces.FrameAnnotator,
-        interfaces.CaptureAnnotator,
-        interfaces.SequenceAnnotator,
-    )
+    whole = (interfaces.FrameAnnotator, interfaces.CaptureAnnotator, interfaces.SequenceAnnotator)
     if not any(isinstance(a, whole) for a in annotators):
         return None
     scene = scenes[""]

@@ -9,13 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.annotations.bev_raster import (
-    Grid,
-    covered_cells,
-    footprints,
-    ribbon,
-    strips,
-)
+from gen_data.annotations.bev_raster import Grid, covered_cells, footprints, ribbon, strips
 from gen_data.config.base_model import Strict
 from gen_data.core import capture, errors, interfaces, lane_geometry, sample, se3
 from gen_data.core.scene import Body, Instance, Scene
@@ -58,11 +52,7 @@ class BevMap(Strict):
     def annotate_frame(
         self, scenes: Mapping[str, Scene], assets: interfaces.AssetLibrary, truth: sample.EgoTruth
     ) -> sample.EgoTruth:
-        """Fill in ``birdseye``.
-
-        Raises:
-            ConfigError: the scene has no rig.
-        """
+        """Fill in ``birdseye``. Raises ConfigError if the scene has no rig."""
         if not truth.rig:
             raise errors.ConfigError(
                 "annotation 'bev_map': the scene has no rig to centre the map on; add an element"

@@ -16,12 +16,7 @@ from gen_data.core.rolling_shutter_projection import project_moving_points
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 from gen_data.core.surface_points import SurfacePoints
-from gen_data.core.surface_text import (
-    SurfaceQuads,
-    SurfaceText,
-    place_on_mesh,
-    place_writing,
-)
+from gen_data.core.surface_text import SurfaceQuads, SurfaceText, place_on_mesh, place_writing
 
 CAPITALS_PX, LETTERS_PX = 7.0, 9.0
 """Least height of readable characters: ISO 9241-303 requires 5 by 7 dots for digits and capitals
@@ -63,11 +58,7 @@ class Text(Strict):
     min_height_px: float = Field(4.0, gt=0)
 
     def annotate_image(
-        self,
-        scene: Scene,
-        assets: AssetLibrary,
-        reading: SensorReading,
-        truth: sample.ImageTruth,
+        self, scene: Scene, assets: AssetLibrary, reading: SensorReading, truth: sample.ImageTruth
     ) -> sample.ImageTruth:
         """Fill in ``texts``; empty where nothing in the image is written on."""
         found = _lines_in_view(scene, assets, reading, self.min_height_px)

@@ -52,10 +52,7 @@ class BodySamples:
 
 
 def bodies_near(
-    bodies: Sequence[Body],
-    T_frame_world: SE3,
-    box: VoxelBox,
-    assets: interfaces.AssetLibrary,
+    bodies: Sequence[Body], T_frame_world: SE3, box: VoxelBox, assets: interfaces.AssetLibrary
 ) -> list[Body]:
     """The bodies that may reach into a box, by spheres around their origins."""
     if not bodies:

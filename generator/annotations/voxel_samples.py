@@ -78,10 +78,7 @@ def split_long(corners_m: Array, side_m: float, low_m: Array, high_m: Array) -> 
 
 
 def inside_lattice(
-    corners_m: Array,
-    low_m: Array,
-    pitch_m: float,
-    shape: tuple[int, int, int],
+    corners_m: Array, low_m: Array, pitch_m: float, shape: tuple[int, int, int]
 ) -> NDArray[np.bool_]:
     """Whether lattice points are inside the solids that triangles bound, bool ``shape``.
 

@@ -240,11 +240,7 @@ class Config:
 
     @property
     def asset_folders(self) -> tuple[Path, ...]:
-        """Folders of the user's assets.
-
-        Raises:
-            ConfigError: a folder does not exist.
-        """
+        """Folders of the user's assets. Raises ConfigError if a folder does not exist."""
         listed = self.document.get("assets", "folders")
         return tuple(
             self.asset_places.get(node.text)

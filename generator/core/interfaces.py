@@ -520,11 +520,7 @@ class CaptureAnnotator(Protocol):
         ...
 
     def annotate_capture(
-        self,
-        scenes: Mapping[str, Scene],
-        assets: AssetLibrary,
-        capture: Capture,
-        truth: EgoTruth,
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, capture: Capture, truth: EgoTruth
     ) -> EgoTruth:
         """The truth with this annotator's fields filled in.
 

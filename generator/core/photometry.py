@@ -55,11 +55,7 @@ def illuminance_to_intensity_cd(light: Light, lux: float, distance_m: float) -> 
 
 
 def luminance_cd_m2(light: Light) -> float:
-    """Luminance of a panel's front [cd/m^2].
-
-    Raises:
-        ValueError: the light is not a panel.
-    """
+    """Luminance of a panel's front [cd/m^2]. Raises ValueError if the light is not a panel."""
     match light.kind:
         case "rectangle":
             return light.intensity_cd / (light.size_m[0] * light.size_m[1])

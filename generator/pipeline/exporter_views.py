@@ -15,13 +15,7 @@ from typing import TypeVar
 from gen_data.annotations.annotate import Thresholds
 from gen_data.core.capture import Capture, Channel
 from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import (
-    AssetLibrary,
-    DatasetInfo,
-    Exporter,
-    Modality,
-    reading_paths,
-)
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter, Modality, reading_paths
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Camera, Device, Lidar, Scene
 from gen_data.exporters.base import (
@@ -83,11 +77,7 @@ class ExporterView:
         return formats
 
     def info(self, info: DatasetInfo) -> DatasetInfo:
-        """The data set as the exporter sees it.
-
-        Raises:
-            ConfigError: a name fits no sensor.
-        """
+        """The data set as the exporter sees it. Raises ConfigError if a name fits no sensor."""
         cameras = select_names(self.cameras, info.cameras, f"{self._place}: cameras")
         others = [s.name for s in info.sensors if s.modality is not Modality.CAMERA]
         kept = {*cameras, *select_names(self.sensors, others, f"{self._place}: sensors")}

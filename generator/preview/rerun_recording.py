@@ -28,14 +28,7 @@ from gen_data.core import (
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.capture import LAYERS, Capture, Channel, PointCloud, SensorReading
 from gen_data.core.lane_geometry import LaneBorder
-from gen_data.core.sample import (
-    BorderTruth,
-    ImageTruth,
-    Occupancy,
-    Sample,
-    SensorTracks,
-    TextTruth,
-)
+from gen_data.core.sample import BorderTruth, ImageTruth, Occupancy, Sample, SensorTracks, TextTruth
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.exporters import label_parts
 from gen_data.exporters.label_colors import id_color
@@ -301,11 +294,7 @@ def save_recording(
     info: interfaces.DatasetInfo,
     points: sensor_views.PointColors = "class",
 ) -> None:
-    """Write samples to a ``.rrd`` file.
-
-    Raises:
-        StorageError: the file cannot be written.
-    """
+    """Write samples to a ``.rrd`` file. Raises StorageError if the file cannot be written."""
     try:
         with whole_files.whole_file(path) as unfinished:
             unfinished.touch()

@@ -149,11 +149,7 @@ def _linked_files(stored: CheckedSamples, shard: int) -> list[shard_record.FileR
 
 
 def _read_licences(path: Path) -> str:
-    """The text that is copied into the export.
-
-    Raises:
-        StorageError: the file is damaged.
-    """
+    """The text that is copied into the export. Raises StorageError if the file is damaged."""
     expected = seal.read_sums(path.parent).digests.get(path.name)
     check_digest(path, expected, path.parent, f"the one in {layout.SUMS_NAME}")
     return path.read_text("utf-8")

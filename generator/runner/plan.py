@@ -77,11 +77,7 @@ def write_plan(plan: Plan, folder: Path, scratch: Path) -> None:
 
 
 def load_plan(folder: Path) -> Plan:
-    """Read the plan of a data set.
-
-    Raises:
-        StorageError: it is missing or damaged.
-    """
+    """Read the plan of a data set. Raises StorageError if it is missing or damaged."""
     path = folder / PLAN_NAME
     try:
         data = path.read_bytes()

@@ -53,11 +53,7 @@ class JsonLines:
         self._ends = np.flatnonzero(data == ord("\n")) + 1
 
     def line(self, number: int) -> bytes:
-        """Read a line.
-
-        Raises:
-            ValueError: the file ends before.
-        """
+        """Read a line. Raises ValueError if the file ends before."""
         if number >= len(self._ends):
             raise ValueError(f"it has {len(self._ends)} lines, expected more")
         start = int(self._ends[number - 1]) if number else 0
@@ -150,11 +146,7 @@ class StoredSamples:
         )
 
     def kept_scene(self, index: int) -> KeptScene:
-        """Read the scene of a sample.
-
-        Raises:
-            StorageError: it is missing or damaged.
-        """
+        """Read the scene of a sample. Raises StorageError if it is missing or damaged."""
         with self._damage(self._folder_of(index) / SCENES_NAME):
             return parse_scene(self._line(SCENES_NAME, index), self._base_scene)
 

@@ -139,11 +139,7 @@ class Instrument(Mounted):
 
 
 def check_rig(scene: Scene, sensor: str, rig: str) -> str:
-    """Return the name of an existing rig.
-
-    Raises:
-        ConfigError: the scene has no such rig.
-    """
+    """Return the name of an existing rig. Raises ConfigError if the scene has no such rig."""
     known = [r.name for r in scene.rigs]
     if rig not in known:
         raise ConfigError(
@@ -169,11 +165,7 @@ def add_lidar(scene: Scene, sensor: Mounted, lidar: Lidar) -> Scene:
 
 
 def find_camera(scene: Scene, sensor: str, camera: str) -> Camera:
-    """The camera of that name.
-
-    Raises:
-        ConfigError: the scene has no such camera.
-    """
+    """The camera of that name. Raises ConfigError if the scene has no such camera."""
     known = {c.name: c for c in scene.cameras}
     if camera not in known:
         raise ConfigError(

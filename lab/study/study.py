@@ -94,12 +94,7 @@ def _skipped(real: RealSet) -> Table:
     if len(sizes) > 5:
         rows.append(["pictures of other sizes", str(sum(c for _, c in sizes.most_common()[5:]))])
     rows += [[f"skipped: {reason}", str(count)] for reason, count in real.skipped.items()]
-    return {
-        "title": "read files",
-        "header": ["", "count"],
-        "rows": rows,
-        "note": str(real.source),
-    }
+    return {"title": "read files", "header": ["", "count"], "rows": rows, "note": str(real.source)}
 
 
 def _ignore(line: str) -> None:

@@ -67,11 +67,7 @@ class ModelServer:
     timeout_s: float = 300.0
 
     def __post_init__(self) -> None:
-        """Refuse URLs and keys that cannot be used.
-
-        Raises:
-            ConfigError: one of them cannot.
-        """
+        """Refuse URLs and keys that cannot be used. Raises ConfigError if one of them cannot."""
         place = urllib.parse.urlsplit(self.url)
         try:
             is_url = place.scheme in ("http", "https") and bool(place.hostname) and place.port != 0

@@ -143,9 +143,7 @@ def test_plan_measures_labels_by_class(tmp_path: Path) -> None:
     assert "did you mean 'apple'?" in done.stderr
 
 
-def test_sensors_that_an_exporter_cannot_hold_are_rendered_without_it(
-    tmp_path: Path,
-) -> None:
+def test_sensors_that_an_exporter_cannot_hold_are_rendered_without_it(tmp_path: Path) -> None:
     """It is named with its reason; an exporter that the user names is refused."""
     kitti = [{"type": "coco"}, {"type": "kitti"}]
     gen_data.generate(room(SEES, exporters=kitti), 1, out=tmp_path / "set", workers=0)

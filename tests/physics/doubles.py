@@ -69,10 +69,7 @@ def cylinder(
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=1)
     top = radius_m if top_radius_m is None else top_radius_m
     return np.concatenate(
-        [
-            ring * radius_m + [0, 0, z_m - height_m / 2],
-            ring * top + [0, 0, z_m + height_m / 2],
-        ]
+        [ring * radius_m + [0, 0, z_m - height_m / 2], ring * top + [0, 0, z_m + height_m / 2]]
     )
 
 

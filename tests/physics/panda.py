@@ -40,10 +40,7 @@ def panda() -> RobotModel:
         collisions=assets,
         home=HOME,
         gripper=Gripper(
-            HAND,
-            SE3((0.0, 0.0, 0.105)),
-            ("panda_finger_joint1", "panda_finger_joint2"),
-            0.08,
+            HAND, SE3((0.0, 0.0, 0.105)), ("panda_finger_joint1", "panda_finger_joint2"), 0.08
         ),
         no_collide=frozenset({*neighbours, ("panda_hand", "panda_rightfinger")}),
     )

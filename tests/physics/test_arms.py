@@ -228,9 +228,7 @@ def test_a_tall_object_is_held_near_its_end_clear_of_the_palm(engine: Engine) ->
         assert distance_m(settled.scene.body(f"arm/{link}"), held) > 0.0
 
 
-def test_fingers_close_on_what_is_between_them_not_on_the_whole_object(
-    engine: Engine,
-) -> None:
+def test_fingers_close_on_what_is_between_them_not_on_the_whole_object(engine: Engine) -> None:
     """A mast on one side of a wider foot, held by the mast: both pads touch it."""
     settled = engine.settle(holding("mast", above_table(0.1, 0.0, 0.5)))
 
@@ -303,9 +301,7 @@ def test_a_robot_without_a_gripper_follows_joint_candidates(engine: Engine) -> N
     assert settled.scene.articulations[0].joint_positions == (1.5, 0.0)
 
 
-def test_a_candidate_of_the_wrong_length_is_a_mistake_not_a_rejection(
-    engine: Engine,
-) -> None:
+def test_a_candidate_of_the_wrong_length_is_a_mistake_not_a_rejection(engine: Engine) -> None:
     """Seven arm joints need seven numbers."""
     goal = ArmGoal("joints", joint_candidates=((0.0, 0.0),))
 

@@ -60,9 +60,7 @@ def test_nothing_floats_above_or_sinks_into_its_support(
     assert lowest_m(scene.body("it")) == pytest.approx(TABLE_TOP_Z_M, abs=HALF_A_MM)
 
 
-def test_what_rests_on_an_edge_before_tipping_over_lies_flat_afterwards(
-    engine: Engine,
-) -> None:
+def test_what_rests_on_an_edge_before_tipping_over_lies_flat_afterwards(engine: Engine) -> None:
     """A book that starts at 40 degrees ends on its cover; no damping holds it up."""
     turn = (math.cos(math.radians(20)), math.sin(math.radians(20)), 0.0, 0.0)
     book = thing("book", "box 0.15 0.22 0.025")
@@ -224,9 +222,7 @@ def test_what_still_moves_when_time_is_up_is_refused(engine_name: EngineName) ->
     assert "physics.settle_time_s_max" in outcome.rejection.remedy
 
 
-def test_objects_on_neighbouring_tables_do_not_meet_each_others_walls(
-    engine: Engine,
-) -> None:
+def test_objects_on_neighbouring_tables_do_not_meet_each_others_walls(engine: Engine) -> None:
     """The wall of one table stands on the other, but is there for its own objects only."""
     scene = table_scene(thing("near", "box 0.05 0.05 0.05", x=-0.2))
     other = SupportSurface("annex", "annex", SE3((0.9, 0, TABLE_TOP_Z_M)), (0.6, 0.8), 2.0)

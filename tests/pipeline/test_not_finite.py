@@ -135,8 +135,7 @@ class Broken:
 
 
 @pytest.mark.parametrize(
-    ("channel", "value"),
-    [(Channel.RADIANCE, NAN), (Channel.RADIANCE, INF), (Channel.Z_DEPTH, NAN)],
+    ("channel", "value"), [(Channel.RADIANCE, NAN), (Channel.RADIANCE, INF), (Channel.Z_DEPTH, NAN)]
 )
 def test_a_wrong_pixel_of_a_renderer_is_found_before_it_is_developed(
     pipeline: Pipeline, channel: Channel, value: float

@@ -38,9 +38,7 @@ def _walls(street: Street) -> list[Body]:
     return [body for body in street.scene.bodies if body.group == "retaining_walls"]
 
 
-def test_walls_stand_on_the_ground_at_their_whole_front(
-    cut: tuple[Street, AssetLibrary],
-) -> None:
+def test_walls_stand_on_the_ground_at_their_whole_front(cut: tuple[Street, AssetLibrary]) -> None:
     """Feet of a section of 3 m, which is straight, are up to 5 cm off the bent and sloping ground.
 
     A radius of 50 m leaves 2 cm; the ground's planes of 4 m meet below sections at up to 2 %.

@@ -92,9 +92,7 @@ def test_unknown_target_is_named(made: Callable[[tuple[str, ...]], RandomizerBas
 
 
 @looks
-def test_geometry_and_labels_are_left(
-    made: Callable[[tuple[str, ...]], RandomizerBase],
-) -> None:
+def test_geometry_and_labels_are_left(made: Callable[[tuple[str, ...]], RandomizerBase]) -> None:
     """Looks are looks: poses, assets, instances stay."""
     scene = scene_with("brick", "bottle")
     now = after(made(("table", "clutter")), scene)

@@ -34,9 +34,7 @@ def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
     cache = device_cache.DeviceCache(fake_library.FakeLibrary(MESHES), open_device("cpu"))
     kept = set(
         bodies_within(
-            pack_world(scene, camera, cache).body_records,
-            pack_view(camera, cache),
-            margin,
+            pack_world(scene, camera, cache).body_records, pack_view(camera, cache), margin
         )
     )
     size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])

@@ -41,9 +41,7 @@ def test_a_denoised_image_is_closer_to_the_converged_one() -> None:
     assert clean.tobytes() == radiance(DENOISED).tobytes()
 
 
-def test_without_its_package_the_error_names_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_its_package_the_error_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyoidn", None)
 
     with pytest.raises(ConfigError, match=r"render\.denoise .*pip install .*\[denoise\]"):

@@ -150,9 +150,7 @@ def test_going_there_and_back_leads_to_the_same_pixel(renderer: WarpRenderer) ->
     assert np.abs(flow + back)[seen].max() < 0.01
 
 
-def test_points_are_occluded_where_a_ray_meets_something(
-    renderer: WarpRenderer,
-) -> None:
+def test_points_are_occluded_where_a_ray_meets_something(renderer: WarpRenderer) -> None:
     """Every pixel's point, traced by a ray of its own a step later; edges are a pixel wide."""
     start = SE3((-0.6, 0.0, 3.0))
     box = Body("box", "box", start, instance_id=1)

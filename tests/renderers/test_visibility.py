@@ -72,9 +72,7 @@ def test_depth_of_a_sphere_is_that_of_the_quadratic_equation(renderer: WarpRende
     assert np.isinf(depth[root < -0.05]).all()
 
 
-def test_normals_of_a_sphere_point_outwards_and_to_the_camera(
-    renderer: WarpRenderer,
-) -> None:
+def test_normals_of_a_sphere_point_outwards_and_to_the_camera(renderer: WarpRenderer) -> None:
     """Normals are unit, in the camera frame, and zero in the background."""
     camera = fake_library.forward_camera((64, 64), focal_px=60.0)
     reading = seen(renderer, scene_of(Body("ball", "sphere", SE3((0.0, 0.0, 3.0)))), camera)
@@ -89,9 +87,7 @@ def test_normals_of_a_sphere_point_outwards_and_to_the_camera(
     assert not normals[~hit].any()
 
 
-def test_the_inside_of_a_surface_has_its_normal_turned_round(
-    renderer: WarpRenderer,
-) -> None:
+def test_the_inside_of_a_surface_has_its_normal_turned_round(renderer: WarpRenderer) -> None:
     scene = scene_of(Body("plane", "plane", SE3((0.0, 0.0, 2.0))))
 
     normals = seen(renderer, scene, fake_library.forward_camera()).channels[Channel.NORMALS]

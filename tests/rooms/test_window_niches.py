@@ -18,9 +18,7 @@ def room(*holes: Hole) -> LitRoom:
 
 
 @pytest.mark.parametrize("side", [0, 1, 2, 3])
-def test_what_faces_outdoors_has_its_light_and_what_faces_the_room_none_of_it(
-    side: int,
-) -> None:
+def test_what_faces_outdoors_has_its_light_and_what_faces_the_room_none_of_it(side: int) -> None:
     """Surfaces across the wall receive some of both."""
     axis = side // 2
     low, high = [1.0, 1.0, 0.9], [2.0, 2.0, 2.1]

@@ -26,10 +26,7 @@ def with_ready_workers(shards: int, workers: int, **limits: float) -> Supervisor
 
 def test_no_more_processes_than_shards_are_started_and_go_home_after_the_last() -> None:
     """Two shards need two of eight workers."""
-    assert make_supervisor(shards=2, workers=8).start(0.0) == [
-        events.Spawn(0),
-        events.Spawn(1),
-    ]
+    assert make_supervisor(shards=2, workers=8).start(0.0) == [events.Spawn(0), events.Spawn(1)]
     # One worker, one shard: assign, dismiss, finished when it is gone.
     supervisor = make_supervisor(shards=1, workers=1)
     supervisor.start(0.0)

@@ -8,12 +8,7 @@ from http.server import BaseHTTPRequestHandler
 import pytest
 
 from gen_data.core.errors import ConfigError
-from gen_data.lab.write.language_model import (
-    REPLY_BYTES_MAX,
-    Message,
-    ModelCommand,
-    ModelServer,
-)
+from gen_data.lab.write.language_model import REPLY_BYTES_MAX, Message, ModelCommand, ModelServer
 from tests.write.scripted import Answer, body_of, send, serve
 
 TALK = (Message("system", "rules"), Message("user", "mugs"))

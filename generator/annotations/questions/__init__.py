@@ -45,11 +45,7 @@ TABLE = PluginTable[Any](
 
 
 def load(name: str) -> Question:
-    """The function of a kind.
-
-    Raises:
-        ConfigError: there is none.
-    """
+    """The function of a kind. Raises ConfigError if there is none."""
     return cast(Question, TABLE.load(name))
 
 

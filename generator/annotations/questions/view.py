@@ -217,11 +217,7 @@ def measure(numbers: Iterable[float], unit: str, margin: float, least: float) ->
 
 
 def stated(
-    kind: str,
-    text: tuple[str, str],
-    things: Sequence[Thing],
-    measured: Measured,
-    **more: Any,
+    kind: str, text: tuple[str, str], things: Sequence[Thing], measured: Measured, **more: Any
 ) -> Iterator[Utterance]:
     """A question with its answer, if its margin is at least the resolution of the sensor."""
     if measured.margin >= measured.resolution > 0.0:

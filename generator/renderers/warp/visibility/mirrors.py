@@ -42,10 +42,7 @@ def trace_mirrors(
 
 
 def mirror_images(
-    channels: frozenset[Channel],
-    parts: Sequence[layers.SparseLabels],
-    height: int,
-    width: int,
+    channels: frozenset[Channel], parts: Sequence[layers.SparseLabels], height: int, width: int
 ) -> dict[Channel, NDArray[Any]]:
     """Requested images of what mirrors show; ``parts`` are labels of the image's pixels."""
     images = {}
