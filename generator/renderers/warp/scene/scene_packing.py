@@ -100,7 +100,7 @@ class _PackedScene:
     layered: bool
 
 
-_FILE_BYTES = 128 << 20
+_FILE_BYTES = 64 << 20
 """Pages of files that frames may read until all are dropped: about what a street's views share."""
 
 
