@@ -103,9 +103,10 @@ class OccupancyGrids(base.ExporterBase):
         Raises:
             ConfigError: there is no such scanner.
         """
-        if not laser_scanner(info, self.lidar, self.type) and "semantickitti" in self.layouts:
+        listing = [name for name in ("semantickitti", "openoccupancy") if name in self.layouts]
+        if listing and not laser_scanner(info, self.lidar, self.type):
             raise ConfigError(
-                f"exporter '{self.type}': layouts: 'semantickitti' lists scans, but there is no"
+                f"exporter '{self.type}': layouts: '{listing[0]}' lists scans, but there is no"
                 " lidar; add a sensor of that type"
             )
 

@@ -71,8 +71,10 @@ def require_channels(
         )
 
 
-def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> None:
-    """Reject lenses that a format of rectified images cannot describe.
+def check_pinholes(
+    info: DatasetInfo, cameras: Iterable[str], exporter: str, field: str = ""
+) -> None:
+    """Reject lenses that a format of rectified images, or its ``field``, cannot describe.
 
     Raises:
         ConfigError: a camera is not a pinhole.
@@ -84,10 +86,11 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
         if model != "pinhole"
     ]
     if bent:
+        place = f"exporter '{exporter}': {field}: " if field else f"exporter '{exporter}': "
         raise ConfigError(
-            f"exporter '{exporter}': {', '.join(bent)}, but the format holds rectified images; add "
-            "rectify: true to the exporter, list the others in its cameras:, use a pinhole, or "
-            "export such images as coco"
+            f"{place}{', '.join(bent)}, but the format holds rectified images; add rectify: true to"
+            " the exporter, list the others in its cameras:, use a pinhole, or export such images"
+            " as coco"
         )
 
 

@@ -100,7 +100,7 @@ class TapVid(base.ExporterBase):
         sensor_selection.rgb_camera(info, "", self.type)
         if "tapvid3d" in self.layouts:
             cameras = sensor_selection.rgb_cameras(info)
-            sensor_selection.check_pinholes(info, cameras, f"{self.type}: layouts: tapvid3d")
+            sensor_selection.check_pinholes(info, cameras, self.type, "layouts: 'tapvid3d'")
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the tracks of each image, and a line for each sample."""

@@ -113,6 +113,14 @@ class VoxelOccupancy(Strict):
             ),
         )
 
+    def check(self, scene: Scene) -> None:
+        """Reject a frame that a scene lacks.
+
+        Raises:
+            ConfigError: the scene has no scanner of the name ``frame``.
+        """
+        self._pose(scene)
+
     def _low_m(self) -> Vec3:
         x, y, _ = self.size_m
         return self.from_m or (-0.5 * x, -0.5 * y, -1.0)
@@ -126,8 +134,8 @@ class VoxelOccupancy(Strict):
                     return lidar.T_world_lidar
             known = ", ".join([WORLD, *sorted(lidar.name for lidar in scene.lidars)])
             raise errors.ConfigError(
-                f"annotation 'occupancy': frame: there is no scanner '{self.frame}';"
-                f" expected one of: {known}"
+                f"annotations.occupancy.frame: there is no scanner '{self.frame}'; expected one of:"
+                f" {known}{errors.did_you_mean(self.frame, known.split(', '))}"
             )
         rig = ego_rig(scene)
         return scene.rig_pose(rig.name).rounded() if rig is not None else IDENTITY

@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache, partial
 import cv2
 
 from gen_data.annotations.annotate import annotate_ego, annotate_reading
+from gen_data.annotations.occupancy import VoxelOccupancy
 from gen_data.annotations.text import Text
 from gen_data.assemble import plugin_tables, preflight
 from gen_data.assemble.config import Config, SceneConfig
@@ -116,6 +117,10 @@ class PipelineFactory:
             ):
                 with refused.collected(), located_errors(config.document):
                     raise error
+            for annotator in annotators_of(config):
+                if isinstance(annotator, VoxelOccupancy):
+                    with refused.collected(), located_errors(config.document):
+                        annotator.check(scene)
         if any(isinstance(annotator, Text) for annotator in annotators_of(config)):
             asking = (e.type for e in config.exporters if "text" in exporter_views.needs_of(e))
             place = "annotations.text"

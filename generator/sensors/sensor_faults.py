@@ -97,6 +97,16 @@ class Extrinsics(Strict):
         return SE3(tuple((length_m * towards).tolist()), turn).rounded(9)
 
 
+def check_most(field: str, most: float, parts: int, name: str) -> None:
+    """Reject a fault of more parts than a sensor has; a distribution without an end is cut there.
+
+    Raises:
+        ValueError: the text names the field.
+    """
+    if parts < most < math.inf:
+        raise ValueError(f"{field}: {most:g} is more than the {parts} {name} of the sensor")
+
+
 class Delivery(Strict):
     """Readings that are lost, doubled or late on their way; each is drawn by itself.
 

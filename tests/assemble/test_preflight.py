@@ -60,6 +60,23 @@ def test_every_exporter_and_every_camera_that_does_not_fit_is_named() -> None:
     assert "'rear'" not in message
 
 
+def test_a_grid_in_the_frame_of_a_scanner_that_does_not_exist_is_refused_at_its_place() -> None:
+    """With the scanners that exist; the frame ``world`` needs none."""
+    scanner = {"type": "lidar", "name": "top", "model": "VLP-16"}
+
+    def gridded(frame: str) -> dict[str, Any]:
+        grid = {"type": "occupancy", "size_m": [4, 4, 2], "voxel_m": 0.5, "frame": frame}
+        return cart({**CAMERA, "name": "front"}, scanner, annotations=["boxes2d", grid])
+
+    check(gridded("top"))
+    check(gridded("world"))
+    message = refusal(gridded("tops"))
+    assert (
+        "annotations[1].frame: there is no scanner 'tops'; expected one of: world, top" in message
+    )
+    assert "did you mean 'top'?" in message
+
+
 def test_every_sensor_that_does_not_fit_is_named() -> None:
     """Two cameras on rigs that do not exist: both, and what exists."""
     message = refusal(

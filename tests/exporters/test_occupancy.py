@@ -200,6 +200,7 @@ def test_annotations_survive_their_line_of_labels(grids: list[Sample]) -> None:
     }
 
 
-def test_completion_without_a_scanner_is_refused(world: Any) -> None:
-    with pytest.raises(ConfigError, match="layouts: 'semantickitti' lists scans, but there is no"):
-        EXPORTER.check(world.info(1))
+@pytest.mark.parametrize("layout", ["semantickitti", "openoccupancy"])
+def test_layouts_of_scans_without_a_scanner_are_refused(layout: Any, world: Any) -> None:
+    with pytest.raises(ConfigError, match=f"layouts: '{layout}' lists scans, but there is no"):
+        OccupancyGrids(layouts=("occ3d", layout)).check(world.info(1))

@@ -247,7 +247,9 @@ def test_annotations_survive_their_line_of_labels(tracks: list[Sample]) -> None:
 def test_bent_lenses_are_refused_by_tapvid_3d_alone(world: Any) -> None:
     info = world.info(4, lenses={"color": "kannala_brandt"})
     TapVid(layouts=("tapvid",)).check(info)
-    with pytest.raises(ConfigError, match=r"layouts: tapvid3d.*camera 'color' has a lens"):
+    with pytest.raises(
+        ConfigError, match=r"^exporter 'tapvid': layouts: 'tapvid3d': camera 'color' has a lens"
+    ):
         TapVid().check(info)
 
 

@@ -28,6 +28,7 @@ from gen_data.sensors.camera.exposure import ExposureTime, RollingShutter, make_
 from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 from gen_data.sensors.camera.rgb_encoding import RgbEncoding
 from gen_data.sensors.mounting import Mounted, check_rig
+from gen_data.sensors.sensor_faults import check_most
 
 Image = Literal[
     Channel.RGB, Channel.Z_DEPTH, Channel.RANGE, Channel.NORMALS, Channel.INSTANCE, Channel.PART,
@@ -109,6 +110,13 @@ class RgbCamera(Mounted):
     @model_validator(mode="after")
     def _has_layers(self) -> "RgbCamera":
         check_layers(self.model_fields_set, self.media)
+        return self
+
+    @model_validator(mode="after")
+    def _has_the_lines(self) -> "RgbCamera":
+        if self.faults is not None:
+            _, most = self.faults.dead_lines.support()
+            check_most("faults.dead_lines", most, sum(self.size_px), "rows and columns")
         return self
 
     @model_validator(mode="after")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, WithJsonSchema, field_validator
+from pydantic import Field, WithJsonSchema, field_validator, model_validator
 
 from gen_data.config.base_model import NAME_PATTERN
 from gen_data.core import asset_types, errors, interfaces
@@ -21,6 +21,7 @@ from gen_data.sensors.lidar import (
     scan_pattern,
 )
 from gen_data.sensors.lidar.lidar_faults import LidarFaults
+from gen_data.sensors.sensor_faults import check_most
 
 SUBRAYS = 7
 """Rays that sample a beam with divergence."""
@@ -94,6 +95,14 @@ class LidarSensor(mounting.Mounted):
                 f"{errors.did_you_mean(model, known)}"
             )
         return model
+
+    @model_validator(mode="after")
+    def _has_the_beams(self) -> "LidarSensor":
+        rings = len(self.device.elevations_rad()) if self.faults is not None else 0
+        if self.faults is not None and rings:
+            _, most = self.faults.dead_beams.support()
+            check_most("faults.dead_beams", most, rings, "beams")
+        return self
 
     @property
     def device(self) -> scan_pattern.LidarModel:
