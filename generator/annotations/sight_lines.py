@@ -1,5 +1,6 @@
 """Which points a sensor sees: one ray to each."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -103,8 +104,23 @@ def cast_rays(
         reach_m,
         shifts_m if shifts_m.any() else None,
         None if delays_s is None else delays_s.astype(np.float32),
+        _neighbours(origins_m, directions),
     )
     return renderer.scan(scene, eye, rays)
+
+
+SECTOR_RAD = math.radians(5.0)
+"""Angle around Z of the rays that are traced together."""
+
+
+def _neighbours(origins_m: se3.Array, directions: se3.Array) -> NDArray[np.int32]:
+    """Order of rays in which neighbours begin nearby and have nearly one direction.
+
+    Cubic metres of origins, sectors around Z, and in each from below to above.
+    """
+    sector = np.floor(np.arctan2(directions[:, 1], directions[:, 0]) / SECTOR_RAD)
+    keys = (directions[:, 2], sector, *np.rint(origins_m).T)
+    return np.lexsort(keys).astype(np.int32)
 
 
 def _delays(lines: Sequence[SightLines]) -> se3.Array | None:

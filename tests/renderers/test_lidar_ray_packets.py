@@ -10,7 +10,7 @@ from gen_data.core.scene import Body, Lidar, Scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.core.streams import Streams
 from gen_data.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX
-from gen_data.renderers.warp.lidar.lidar_tracing import RUN
+from gen_data.renderers.warp.lidar.lidar_tracing import RUN, RUNS
 from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 
@@ -61,7 +61,7 @@ def same(one: LidarHits, other: LidarHits, rows: slice | NDArray[np.int64] = sli
 def test_runs_that_may_meet_more_than_a_list_holds_find_the_nearest() -> None:
     """Hundreds of cubes and rays so mixed that every run may hit nearly all of them."""
     bodies = cubes(4 * int(LISTED_MAX), 1)
-    directions = drawn(3000, 2, 0.2)
+    directions = drawn(RUN * RUNS, 2, 0.2)
 
     echoes = scanned(Scene("crowd", bodies), LidarRays(directions, 0.0, 1, 100.0))
 
@@ -108,12 +108,13 @@ def test_the_order_of_beams_changes_nothing() -> None:
 
 
 def test_a_ray_alone_finds_what_it_finds_in_company() -> None:
-    """One ray per run, and all in few runs: the same bytes."""
+    """One ray per run, and all in runs as long as there are: the same bytes."""
     scene = Scene("crowd", cubes(100, 10))
-    directions = drawn(3 * RUN + 5, 11, 0.2)
+    count = RUN * RUNS + 5
+    directions = drawn(count, 11, 0.2)
     together = scanned(scene, LidarRays(directions, 0.0, 1, 100.0))
 
-    for i in (0, RUN - 1, RUN, 3 * RUN + 4):
+    for i in (0, RUN - 1, RUN, count - 1):
         alone = scanned(scene, LidarRays(directions[i : i + 1], 0.0, 1, 100.0))
         assert same(together, alone, slice(i, i + 1))
 

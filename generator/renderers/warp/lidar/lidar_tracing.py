@@ -266,8 +266,9 @@ RING_SHARE = math.sqrt(1.0 / 2.0)
 """Radius of the ring of rays, relative to the beam's: half the light is outside it."""
 
 
-RUN = 128
-"""Rays per run: neighbours hit the same few bodies."""
+RUN, RUN_MIN, RUNS = 128, 8, 64
+"""Rays per run: neighbours hit the same few bodies. Few rays are farther from one another: they
+make about ``RUNS`` runs of at least ``RUN_MIN``."""
 
 THREADS = 16
 """Threads of a launch on the CPU, where they run one after another, each with lists of its own."""
@@ -335,7 +336,9 @@ def _scan(lidar: Lidar, beams: LidarRays, cache: DeviceCache) -> kernels.Scan:
     scan.reach_m = beams.range_max_m
     scan.spread = RING_SHARE * math.tan(0.5 * beams.divergence_rad)
     scan.subrays = beams.subrays
-    is_cpu = cache.device.is_cpu
-    scan.run, scan.threads = (RUN, THREADS) if is_cpu else (RUN_CUDA, THREADS_CUDA)
+    scan.run, scan.threads = RUN_CUDA, THREADS_CUDA
+    if cache.device.is_cpu:
+        rays = len(beams.directions) * beams.subrays
+        scan.run, scan.threads = min(max(rays // RUNS, RUN_MIN), RUN), THREADS
     scan.divergence_rad = beams.divergence_rad
     return scan
