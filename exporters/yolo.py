@@ -236,11 +236,8 @@ def inner_rectangle(points: Polygon, width_px: int, height_px: int) -> Array:
     u = hull[:, 0] * along[:, :1] + hull[:, 1] * along[:, 1:]
     v = hull[:, 0] * across[:, :1] + hull[:, 1] * across[:, 1:]
     u0, u1, v0, v1 = u.min(axis=1), u.max(axis=1), v.min(axis=1), v.max(axis=1)
-    points = [
-        a[:, None] * along + b[:, None] * across
-        for a, b in ((u0, v0), (u1, v0), (u1, v1), (u0, v1))
-    ]
-    corners = np.stack(points, axis=1)
+    ends = ((u0, v0), (u1, v0), (u1, v1), (u0, v1))
+    corners = np.stack([a[:, None] * along + b[:, None] * across for a, b in ends], axis=1)
     slack_px = 1e-6
     limits = np.array([width_px, height_px]) + slack_px
     inside = np.all((corners >= -slack_px) & (corners <= limits), axis=(1, 2))

@@ -13,11 +13,9 @@ from benchmarks.readers.evaluations import __doc__ as about
 from benchmarks.readers.evaluations import lanes, points, text, voxels
 
 Evaluation = Callable[[Path, Path, Path, float], float]
-"""Score of the truth, moved or not, by code in a folder: data sets, folder for files, 0 or 1."""
+"""Score of the truth, moved or not, by code: data sets, folder for files, 0 or 1."""
 GITHUB = "https://github.com"
 SOURCES = {
-    "SCNN": ("XingangPan/SCNN", "428d5e007d5b53e3acfa40dc19fdfa5141d079a3",
-             "tools/lane_evaluation"),
     "OpenLane": ("OpenDriveLab/OpenLane", "8a0ce6b0057278729f4753a57be38c12929d7ad9",
                  "eval/LANE_evaluation"),
     "MapTR": ("hustvl/MapTR", "a6872d8d9670bde17b4b01560f1221f88b443d55",
@@ -38,8 +36,6 @@ SOURCES = {
 }  # fmt: skip
 """Repository, commit, and the folder of its evaluation."""
 EVALUATIONS: dict[str, tuple[Evaluation, str]] = {
-    "CULane": (lanes.by_culane, "SCNN"),
-    "OpenLane, images": (lanes.by_openlane_2d, "OpenLane"),
     "OpenLane, space": (lanes.by_openlane_3d, "OpenLane"),
     "MapTR": (lanes.by_maptr, "MapTR"),
     "SemanticKITTI, voxels": (voxels.by_semantic_kitti_api, "semantic-kitti-api"),
@@ -54,6 +50,8 @@ EVALUATIONS: dict[str, tuple[Evaluation, str]] = {
     "COCO-Text": (text.by_coco_text, "coco-text"),
 }
 """Function, and the repository of its code; ``""``: a package."""
+PROGRAMS: dict[str, Evaluation] = {"CULane": lanes.by_culane, "OpenLane": lanes.by_openlane_2d}
+"""Functions that run a program of the user: C++ that its repository says how to build."""
 LANES = 6
 """Frames of ``lanes.yaml``."""
 BOXES = {
@@ -72,15 +70,26 @@ def main() -> int:
     """Make data sets, run all evaluations and print their scores; 1 if one is not as expected."""
     parser = argparse.ArgumentParser(description=about.splitlines()[0])
     parser.add_argument("--repositories", type=Path, required=True, help="clones; made if absent")
-    folder = parser.parse_args().repositories.resolve()
+    for name in PROGRAMS:
+        parser.add_argument(f"--{name.lower()}", type=Path, help="its program for lines in images")
+    asked = parser.parse_args()
+    folder = asked.repositories.resolve()
     for name, (repository, commit, part) in SOURCES.items():
         clone(folder / name, f"{GITHUB}/{repository}", commit, part)
+    ready = {
+        name: (evaluate, folder / source / SOURCES[source][2] if source else folder)
+        for name, (evaluate, source) in EVALUATIONS.items()
+    }
+    for name, evaluate in PROGRAMS.items():
+        if program := getattr(asked, name.lower()):
+            ready[f"{name}, images"] = evaluate, program.resolve()
+        else:
+            print(f"{name}, images: not judged without --{name.lower()} PROGRAM")
     wrong = False
     with tempfile.TemporaryDirectory(prefix="evaluations-") as scratch:
         data = Path(scratch) / "data"
         make_data(data)
-        for name, (evaluate, source) in EVALUATIONS.items():
-            code = folder / source / SOURCES[source][2] if source else folder
+        for name, (evaluate, code) in ready.items():
             with redirect_stdout(StringIO()):
                 scores = [evaluate(code, data, Path(scratch) / name / str(k), k) for k in (0, 1)]
             print(f"{name:22} truth {scores[0]:.4f}, moved truth {scores[1]:.4f}", flush=True)

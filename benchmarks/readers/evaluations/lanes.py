@@ -12,15 +12,13 @@ from typing import Any
 
 import numpy as np
 
-LIBRARIES = ("core", "imgproc", "imgcodecs", "highgui")
 SIZE_PX = (800, 450)
 MOVED_M, MOVED_PX = 2.0, 60.0
 """Above all thresholds: 1.5 m, and half the overlap of lines 30 px wide."""
 
 
-def by_culane(code: Path, data: Path, out: Path, moved: float) -> float:
+def by_culane(program: Path, data: Path, out: Path, moved: float) -> float:
     """F-measure of CULane's program: lines 30 px wide with half their area in common."""
-    program = build(code, ("src/*.cpp",))
     folder, listed = data / "lanes/culane", out / "list.txt"
     aside = np.array([moved * MOVED_PX, 0.0])
     names = (folder / "list/train.txt").read_text().splitlines()
@@ -37,9 +35,8 @@ def by_culane(code: Path, data: Path, out: Path, moved: float) -> float:
     return run_program(program, folder, out, folder, listed, size)
 
 
-def by_openlane_2d(code: Path, data: Path, out: Path, moved: float) -> float:
+def by_openlane_2d(program: Path, data: Path, out: Path, moved: float) -> float:
     """F-measure of OpenLane's program, CULane's measure on lines of this layout."""
-    program = build(code / "lane2d", ("src/*.cpp", "src/*.c"))
     images = data / "lanes/openlane/images"
     aside = np.array([[moved * MOVED_PX], [0.0]])
     listed = write_openlane(data, out, lambda line: {"uv": (line["uv"] + aside).tolist()})
@@ -134,17 +131,6 @@ class TreeOfGeometries:
     def query(self, geometry: Any) -> list[Any]:
         """Geometries whose boxes meet that of ``geometry``."""
         return [self.geometries[k] for k in self.tree.query(geometry)]
-
-
-def build(code: Path, sources: tuple[str, ...]) -> Path:
-    """Compile a program that links OpenCV."""
-    program = code / "evaluate"
-    if not program.exists():
-        files = [str(path) for pattern in sources for path in sorted(code.glob(pattern))]
-        flags = ["-std=c++11", "-fopenmp", "-I", str(code / "include"), "-I/usr/include/opencv4"]
-        linked = [f"-lopencv_{name}" for name in LIBRARIES]
-        subprocess.run(["g++", *flags, "-o", str(program), *files, *linked], check=True)
-    return program
 
 
 def run_program(
