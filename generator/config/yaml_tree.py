@@ -42,6 +42,41 @@ _LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
 """libyaml's message, from version 0.2.6 on, for 1,000 open brackets, before it returns the
 first."""
 
+_PLAIN = (
+    (
+        r"block collection, .*(expected '-' indicator|<block end>)",
+        "text behind the end of an item; a field belongs before the last '}', and another item "
+        "begins on a new line with '- '",
+    ),
+    (
+        r"block mapping, .*(expected key|<block end>)",
+        "text behind the end of a value, or a line without 'key: value'; a field belongs before "
+        "the last '}' or ']', or on a line with the indentation of its neighbours",
+    ),
+    (
+        r"flow sequence, .*expected ',' or '\]'",
+        "the list that began with '[' goes on; expected ',' and another value, or ']'",
+    ),
+    (
+        r"flow mapping, .*expected ',' or '\}'",
+        "the mapping that began with '{' goes on; expected ',' and another field, or '}'",
+    ),
+    (
+        r"quoted scalar, found unexpected end of stream",
+        "the text that began with a quote never ends; expected the same quote behind it",
+    ),
+    (
+        r"mapping values are not allowed",
+        "a second ':' in one value, or a deeper indentation than in the line before; quote a "
+        "text that has a ':', and indent neighbours alike",
+    ),
+    (
+        r"cannot start any token",
+        "a value cannot begin with this character; expected quotes around the text",
+    ),
+)
+"""Messages of libyaml and of PyYAML's parser, and their meaning without the grammar of YAML."""
+
 ORIGIN = "--set"
 """Name of overrides in messages, in place of a file."""
 
@@ -234,7 +269,8 @@ class _Reader:
             what = ", ".join(part for part in (error.context, error.problem) if part)
             if _LIBYAML_TOO_DEEP in what:
                 self._abort(self._place_of(error), _TOO_DEEP)
-            self._abort(self._place_of(error), f"not valid YAML: {what}")
+            plain = next((words for known, words in _PLAIN if re.search(known, what)), what)
+            self._abort(self._place_of(error), f"not valid YAML: {plain}")
         except yaml.YAMLError as error:
             self._abort(self._at(0, 0), f"not valid YAML: {abbreviate(str(error), 200)}")
 

@@ -9,10 +9,19 @@ def color_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
     seen = np.isfinite(z_depth_m)
     grey = np.zeros(z_depth_m.shape, np.uint8)
     if seen.any():
-        near, far = np.quantile(z_depth_m[seen], [0.01, 0.99])
+        near, far = depth_ends(z_depth_m)
         scale = (far - z_depth_m[seen]) / max(float(far - near), 1e-6)
         grey[seen] = np.clip(40 + 215 * scale, 40, 255).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
+
+
+def depth_ends(z_depth_m: NDArray[np.floating]) -> tuple[np.floating, np.floating]:
+    """Depths [m] of the brightest and of the darkest grey: 1st and 99th percentile of the image.
+
+    It shows something: at least one value is finite.
+    """
+    near, far = np.quantile(z_depth_m[np.isfinite(z_depth_m)], [0.01, 0.99])
+    return near, far
 
 
 def grey_infrared(infrared: NDArray[np.uint16]) -> NDArray[np.uint8]:

@@ -16,6 +16,7 @@ _LINES_MAX = 60
 _SMALL_M, _FINE_M = 4.0, 0.1
 """Longest edge of grounds with a grid finer than a metre, as on the top of a table; its step."""
 _POINTS = 40
+_FONT, _FONT_SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.6
 _SHIFT = 4
 """Fractional bits of drawn coordinates."""
 
@@ -34,7 +35,60 @@ def plate_overlay(plate: plates.Plate, rgb: asset_types.UInt8) -> Image:
         _draw(image, line, _OUTLINE, width + 2 * max(1, width // 3))
     for line, color in lines:
         _draw(image, line, color, width)
+    _write_horizon(image, plate, width)
+    if plate.ground_px:
+        for name, ends in axes_px(plate).items():
+            _draw_arrow(image, name, ends, width)
     return np.asarray(image, np.uint8)
+
+
+def axes_px(plate: plates.Plate) -> dict[str, se3.Array]:
+    """Arrows on the ground from its middle, ahead and to the right of the camera: start and end.
+
+    A table may stand turned against them; the horizon alone shows the roll of a camera.
+    """
+    corners = plates.ground_points(plate, np.array(plate.ground_px))
+    middle = np.array([*corners.mean(axis=0), 0.0])
+    ahead = plate.T_world_camera.rotation()[:, 2] * (1.0, 1.0, 0.0)
+    ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
+    right = np.array([ahead[1], -ahead[0], 0.0])
+    reach_m = 0.15 * float((corners.max(axis=0) - corners.min(axis=0)).min())
+    return {
+        name: _project(plate, np.stack([middle, middle + reach_m * direction]))
+        for name, direction in (("ahead", ahead), ("right", right))
+    }
+
+
+def _draw_arrow(image: Image, name: str, ends_px: se3.Array, width: int) -> None:
+    if not np.isfinite(ends_px).all():
+        return
+    start, end = (tuple(np.clip(p, -1e4, 1e4).round().astype(int).tolist()) for p in ends_px)
+    for color, pen in ((_OUTLINE, width + 2), (_CORNERS, width)):
+        cv2.arrowedLine(image, start, end, color, pen, cv2.LINE_AA, tipLength=0.2)
+    _write(image, name, (end[0] + 4 * width, end[1] - 3 * width), _CORNERS, width)
+
+
+def _write_horizon(image: Image, plate: plates.Plate, width: int) -> None:
+    """Name the horizon, and its roll, below it on the left; not where it is outside the image."""
+    (x, left), (end, right) = plates.horizon_px(plate)
+    roll_deg = math.degrees(plates.tilt_and_roll(plate)[1])
+    text = f"horizon, roll {roll_deg:.1f} deg"
+    (length, height), _ = cv2.getTextSize(text, _FONT, _FONT_SIZE * width, width)
+    lowest = max(left, left + (right - left) * length / (end - x))
+    row = lowest + height + 4 * width
+    if height < row < image.shape[0]:
+        _write(image, text, (4 * width, round(row)), _HORIZON, width)
+
+
+def _write(
+    image: Image, text: str, at: tuple[int, int], color: tuple[int, int, int], width: int
+) -> None:
+    """Write a text with an outline; its lower left corner is at a pixel, or as near as it fits."""
+    size = _FONT_SIZE * width
+    (length, _), _ = cv2.getTextSize(text, _FONT, size, width)
+    place = max(0, min(at[0], image.shape[1] - length)), at[1]
+    for shade, pen in ((_OUTLINE, 4 * width), (color, width)):
+        cv2.putText(image, text, place, _FONT, size, shade, pen, cv2.LINE_AA)
 
 
 def _grid_lines(plate: plates.Plate) -> list[se3.Array]:

@@ -284,37 +284,49 @@ def shared_draws(config: Config, scene: Scene) -> Iterator[Draw]:
             yield f"shared.{name}", distribution, values[name]
 
 
-def observe_randomizer(randomizer: Randomizer, log: list[Draw]) -> Randomizer:
-    """A randomizer with the same results that records its draws."""
+def observe_randomizer(
+    randomizer: Randomizer, log: list[Draw], pinned: Mapping[str, Any] | None = None
+) -> Randomizer:
+    """A randomizer with the same results that records its draws.
+
+    Args:
+        randomizer: One without distributions is returned as it is.
+        log: Receives the draws.
+        pinned: Values by name that replace those drawn. A draw still takes its random numbers: all
+            others stay as they are.
+    """
     if not isinstance(randomizer, BaseModel):
         return randomizer
-    observed: Randomizer = _observe(randomizer, randomizer.name, log)
+    observed: Randomizer = _observe(randomizer, randomizer.name, log, pinned or {})
     return observed
 
 
-def _observe(value: Any, name: str, log: list[Draw]) -> Any:
+def _observe(value: Any, name: str, log: list[Draw], pinned: Mapping[str, Any]) -> Any:
     """The value with all distributions in it replaced by equal ones that record their draws."""
     if isinstance(value, Distribution):
-        return _observe_distribution(value, name, log)
+        return _observe_distribution(value, name, log, pinned)
     if isinstance(value, BaseModel):
         changed = {
-            key: _observe(item, f"{name}.{key}", log)
+            key: _observe(item, f"{name}.{key}", log, pinned)
             for key, item in value
             if isinstance(item, (Distribution, BaseModel, tuple, list, Mapping))
         }
         return value.model_copy(update=changed)
     if type(value) in (tuple, list):
-        return type(value)(_observe(item, f"{name}[{k}]", log) for k, item in enumerate(value))
+        return type(value)(
+            _observe(item, f"{name}[{k}]", log, pinned) for k, item in enumerate(value)
+        )
     if isinstance(value, Mapping):
-        return {key: _observe(item, f"{name}.{key}", log) for key, item in value.items()}
+        return {key: _observe(item, f"{name}.{key}", log, pinned) for key, item in value.items()}
     return value
 
 
 def _observe_distribution(
-    distribution: Distribution[Any], name: str, log: list[Draw]
+    distribution: Distribution[Any], name: str, log: list[Draw], pinned: Mapping[str, Any]
 ) -> Distribution[Any]:
     def draw(rng: Rng) -> Any:
         value = distribution.draw(rng)
+        value = pinned.get(name, value)
         log.append((name, distribution, value))
         return value
 

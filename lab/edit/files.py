@@ -72,6 +72,10 @@ def _references(tree: Node, folder: Path) -> Iterator[tuple[Position, Path]]:
             return
 
 
+class ChangedError(StorageError):
+    """A file is no longer as it was read."""
+
+
 @dataclass(frozen=True)
 class OpenedFile:
     """A file as it was read, and its text for an editor, whose lines end in LF.
@@ -97,10 +101,16 @@ class OpenedFile:
             overwrite: Also if the file has changed since it was read.
 
         Raises:
-            StorageError: it has changed, by another tab or program, or cannot be written.
+            ChangedError: it has changed, or is gone, by another tab or program.
+            StorageError: it cannot be written, as on a full disk; the old file stays.
         """
-        if not overwrite and read_file(self.path).content != self.content:
-            raise StorageError(
+        now = read_file(self.path).content
+        if not overwrite and now is None and self.content is not None:
+            raise ChangedError(
+                f"{self.path} is gone since it was read; overwrite it to write it again"
+            )
+        if not overwrite and now != self.content:
+            raise ChangedError(
                 f"{self.path} has changed since it was read, in another tab or program; reload it, "
                 "or overwrite it"
             )

@@ -7,6 +7,7 @@ from gen_data.core import plugins
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import Modality, SensorInfo
 from gen_data.core.sample import Sample
+from gen_data.preview.depth_scale import draw_depth_scale
 from gen_data.preview.lane_view import draw_borders
 from gen_data.preview.overlay import Image, channel_image, draw_labels
 from gen_data.preview.sensor_views import top_view
@@ -68,6 +69,38 @@ def first_kind(sensor: SensorInfo) -> str:
     return "" if has_none else _MODALITIES[sensor.modality]
 
 
+def find_empty(sample: Sample | LabelledImages, view: View) -> frozenset[str]:
+    """Layers that a view shows, or its kind, of which the sample has nothing."""
+    reading = sample.capture.readings.get(view.sensor)
+    if reading is None:
+        cloud = sample.capture.clouds.get(view.sensor)
+        return frozenset({"scan"} if cloud is not None and not len(cloud.points) else ())
+    if view.kind == "photo":
+        return frozenset(layer for layer in view.layers if not _has(sample, view.sensor, layer))
+    channel = next((c for c in KINDS[view.kind] if c in reading.channels), None)
+    if view.kind == "mirrors":
+        is_empty = channel is None or not reading.channels[channel].any()
+    elif view.kind == "layers":  # The first layer is the picture as it is seen anyway.
+        is_empty = channel is None or not reading.channels[channel][..., 1:].any()
+    else:
+        is_empty = channel is None
+    return frozenset({view.kind} if is_empty else ())
+
+
+def _has(sample: Sample | LabelledImages, sensor: str, layer: str) -> bool:
+    truth = sample.truth[sensor]
+    if layer in ("lanes", "text"):
+        return bool(truth.borders if layer == "lanes" else truth.texts)
+    part = {
+        "boxes": "box",
+        "names": "box",
+        "masks": "mask",
+        "keypoints": "keypoints",
+        "boxes3d": "box3d_camera",
+    }
+    return any(getattr(item, part[layer]) for item in truth.objects)
+
+
 def draw_view(
     sample: Sample | LabelledImages, view: View, views: Mapping[str, str], unit: float
 ) -> Image:
@@ -95,4 +128,7 @@ def draw_view(
             draw_texts(image, sample.truth[name].texts or (), unit)
         return image
     shown = next((c for c in KINDS[view.kind] if c in reading.channels), None)
-    return channel_image(reading, shown or next(iter(reading.channels)))
+    image = channel_image(reading, shown or next(iter(reading.channels)))
+    if view.kind == "depth" and shown is not None:
+        draw_depth_scale(image, reading.channels[shown], max(1.0, unit))
+    return image

@@ -334,8 +334,10 @@ def describe(found: own_files.Checked, is_assumed: bool = False) -> str:
     if finding.note:
         room = finding.note.rpartition(", ")[2]
         facts.append(f"{ASSUMED}; {room} then" if is_assumed else finding.note)
-        facts.append(
+        facts += (
             "red: horizon; yellow: ground, whose corners can be dragged; blue: a grid of 0.1 m, or "
-            "1 m on large ground"
+            "1 m on large ground",
+            "arrows: ahead and right of the camera. A table that stands turned has edges across "
+            "them, which is right; only the horizon shows the roll",
         )
     return "\n".join([*facts, *finding.warnings])

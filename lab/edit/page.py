@@ -23,7 +23,7 @@ from gen_data.lab.edit import completion
 from gen_data.lab.edit.browse_page import BrowsePage
 from gen_data.lab.edit.data_sets import is_data_set
 from gen_data.lab.edit.document import Fault, find_item
-from gen_data.lab.edit.files import read_file
+from gen_data.lab.edit.files import ChangedError, read_file
 from gen_data.lab.edit.own_files_panel import OwnFilesPanel
 from gen_data.lab.edit.panels import (
     ControlsPanel,
@@ -42,14 +42,16 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.desk import Desk
 
 HERE = Path(__file__).parent
-PAUSE_S = 0.04
+PAUSE_S = 0.02
 """Pause in typing after which a text is read."""
+LOOK_S = 2.0
+"""Time between two looks at the file on disk."""
 VIEWS = {
     "photo": "photograph",
     "depth": "depth",
     "normals": "normals",
     "layers": "layers through glass",
-    "mirrors": "seen in mirrors",
+    "mirrors": "surfaces seen in mirrors",
     "scan": "LiDAR from above",
 }
 LAYER_NAMES = {
@@ -157,6 +159,7 @@ class EditorTab:
         self._orders: list[Any] = []
         self._tiles: list[Tile] = []
         self.chosen: Shown | None = None
+        self._on_disk = ""
 
     def build(self) -> None:
         """Make all widgets, and begin."""
@@ -178,11 +181,13 @@ class EditorTab:
             with ui.element("section").classes("gd-right").props('aria-label="Samples"'):
                 self._build_view_bar()
                 self._busy = ui.label("").classes("gd-busy").props('role="status"')
+                self._empty = ui.label("").classes("gd-empty").props('role="status"')
                 self._grid = ui.element("div").classes("gd-grid").props("data-grid=pictures")
                 self._build_panels()
         ui.add_body_html('<script type="module" src="/edit/editor.js"></script>')
         ui.on("gd-line", self._moved)
         ui.timer(0.0, self._begin, once=True)
+        ui.timer(LOOK_S, self._look)
 
     def _build_bar(self) -> None:
         home_link()
@@ -318,6 +323,7 @@ class EditorTab:
         if isinstance(result, Refused):
             self._show_faults()
         if not self.session.outdated and len(self.session.results) == len(self._orders):
+            self._empty.text = describe_empty(self.session.empty)
             self._refresh_panel()
 
     def _hear(self, heard: Activity) -> None:
@@ -378,7 +384,17 @@ class EditorTab:
                 ).props("dense no-caps outline size=sm")
 
     def _saved_words(self) -> str:
+        if self._on_disk:
+            return f"not saved: the file {self._on_disk}"
         return "not saved" if self.session.is_changed else "saved"
+
+    async def _look(self) -> None:
+        """Tell whether another program has changed the file, or taken it away."""
+        found = await asyncio.to_thread(self.session.find_change)
+        if found != self._on_disk:
+            self._on_disk = found
+            if not self.session.faults:
+                self._state.text = self._saved_words()
 
     def _typed(self) -> None:
         self._changed.set()
@@ -419,9 +435,13 @@ class EditorTab:
         try:
             self.session.text = self.editor.value
             self.session.save(overwrite=overwrite)
-        except GenDataError as error:
+        except ChangedError as error:
             self._refuse_save(str(error))
             return
+        except GenDataError as error:
+            ui.notify(f"not saved: {error}", type="negative", multi_line=True, timeout=10_000)
+            return
+        self._on_disk = ""
         self._title.text = self.session.file.path.name
         self._state.text = self._saved_words()
         ui.run_javascript(f"window.genDataEdit.forget({f'gen-data:{self.session.name}'!r})")
@@ -445,6 +465,7 @@ class EditorTab:
 
     def _reload(self) -> None:
         self.session.file = read_file(self.session.file.path)
+        self._on_disk = ""
         self.edit(self.session.file.text)
 
     def _save_as(self) -> None:
@@ -473,6 +494,12 @@ class EditorTab:
         TABS.pop(self.key, None)
         self.desk.forget(self.key)
         self._task.cancel()
+
+
+def describe_empty(names: list[str]) -> str:
+    """What the shown samples lack, in words; empty for nothing."""
+    words = [LAYER_NAMES.get(name) or VIEWS[name] for name in names]
+    return f"these samples have no {', no '.join(words)}" if words else ""
 
 
 class Tile:

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import quote
 
@@ -17,6 +18,7 @@ from nicegui import ui
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core import processes
 from gen_data.core.errors import ConfigError, GenDataError
+from gen_data.exporters.label_colors import id_color
 from gen_data.lab.edit import controls, statistics
 from gen_data.lab.edit.document import list_origins
 from gen_data.lab.edit.samples import Recording
@@ -154,18 +156,7 @@ class ControlsPanel:
             text = "" if control.value is None else to_flow_yaml(control.value)
             ui.label(text).style("overflow-wrap: anywhere")
         elif control.kind == "range":
-            low, high = control.value[control.form]
-            ui.range(
-                min=control.low,
-                max=control.high,
-                step=control.step,
-                value={"min": low, "max": high},
-            ).props(f"label dense {named}").on(
-                "update:model-value",
-                lambda e: change((e.args["min"], e.args["max"])),
-                throttle=0.1,
-                leading_events=False,
-            )
+            self._build_range(control, change)
         elif control.kind == "normal":
             for name in ("mean", "stddev"):
                 ui.number(
@@ -176,6 +167,37 @@ class ControlsPanel:
                 ).props("dense")
         else:
             self._build_slider(control, change)
+
+    def _build_range(self, control: controls.Control, change: Any) -> None:
+        """A slider with two thumbs, and a field of each end for the keyboard."""
+        low, high = control.value[control.form]
+        both = {"min": low, "max": high}
+        fields: dict[str, Any] = {}
+
+        def typed(end: str, event: Any) -> None:
+            ends = {**slider.value, end: event.value}
+            if event.value is None or ends == slider.value or ends["min"] > ends["max"]:
+                return
+            slider.props["min"] = min(slider.props["min"], ends["min"])
+            slider.props["max"] = max(slider.props["max"], ends["max"])
+            slider.value = ends
+            change((ends["min"], ends["max"]))
+
+        def slid(event: Any) -> None:
+            for end, field in fields.items():
+                field.value = event.args[end]
+            change((event.args["min"], event.args["max"]))
+
+        with ui.element("div").classes("gd-range"):
+            slider = (
+                ui.range(min=control.low, max=control.high, step=control.step, value=both)
+                .props(f'label dense aria-label="{control.field}"')
+                .on("update:model-value", slid, throttle=0.1, leading_events=False)
+            )
+            for end, name in (("min", "least"), ("max", "greatest")):
+                fields[end] = ui.number(
+                    value=both[end], step=control.step, on_change=partial(typed, end)
+                ).props(f'dense debounce=300 data-end="{end}" aria-label="{control.field}, {name}"')
 
     def _build_slider(self, control: controls.Control, change: Any) -> None:
         value = control.value["probability"] if control.form == "probability" else control.value
@@ -330,13 +352,13 @@ class StatisticsPanel:
         self._tab = tab
         self._real: statistics.Summary | None = None
         self._process: asyncio.subprocess.Process | None = None
+        self._is_fitting = False
         tab.client.on_delete(self._end_fit)
         self._note = ui.label("")
         if tab.desk.real is not None:
             with ui.element("div").classes("gd-row"):
-                ui.button("Fit to the real pictures", on_click=self._fit).props(
-                    "dense no-caps outline"
-                )
+                self._start = ui.button("Fit to the real pictures", on_click=self._fit)
+                self._start.props("dense no-caps outline").set_enabled(False)
                 self._scenes = ui.number(
                     "scenes to simulate", value=SCENES, min=LEAST, step=1, precision=0
                 ).props('dense data-fit="scenes"')
@@ -354,12 +376,19 @@ class StatisticsPanel:
         try:
             self._real = await asyncio.to_thread(statistics.read_summary, self._tab.desk.real)
         except GenDataError as error:
-            self._progress.text = str(error)
+            self._progress.text = f"there is nothing to fit to: {error}"
         self.refresh()
+
+    def _allow(self) -> None:
+        """Allow a fit where there are real pictures and samples, and none runs."""
+        if self._tab.desk.real is not None:
+            is_idle = self._process is None and not self._is_fitting
+            self._start.set_enabled(bool(is_idle and self._real and self._tab.session.shown))
 
     def refresh(self) -> None:
         """Show the statistics of the pictures that are complete."""
         shown = self._tab.session.shown
+        self._allow()
         ours = statistics.summarise(shown)
         sides = [("shown", ours), *([("real", self._real)] if self._real else [])]
         lights = [f"{n} {s.brightness:.2f}" for n, s in sides if s.brightness is not None]
@@ -382,7 +411,7 @@ class StatisticsPanel:
         """Run the command match on the saved file; its result is a file that extends it."""
         session, real = self._tab.session, self._tab.desk.real
         path = session.file.path
-        if session.is_changed or session.file.content is None:
+        if session.is_changed:
             self._progress.text = "save the file first: the fit extends it"
             return
         out = path.with_name(f"{path.stem}_matched.yaml")
@@ -398,8 +427,17 @@ class StatisticsPanel:
             "--scenes",
             str(int(self._scenes.value or SCENES)),
         )
-        if self._process is not None:
+        if self._is_fitting:
             return
+        self._is_fitting = True
+        self._allow()
+        try:
+            await self._run_fit(command, out)
+        finally:
+            self._is_fitting = False
+            self._allow()
+
+    async def _run_fit(self, command: Sequence[str], out: Path) -> None:
         self._result.clear()
         self._progress.text = "fitting; this takes some minutes ..."
         self._cancel.set_visibility(True)
@@ -459,17 +497,28 @@ def home_link() -> None:
     ui.link("gen-data", "/?start=1").classes("gd-home").props["title"] = "start page"
 
 
-def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
-    """A plain table; all cells are text."""
+def table(
+    header: tuple[str, ...], rows: Sequence[tuple[str, ...]], colors: Sequence[str] = ()
+) -> None:
+    """A plain table; all cells are text.
+
+    Args:
+        header: Names of the columns.
+        rows: Cells.
+        colors: CSS colour of a square at the beginning of each row; empty = none.
+    """
     with ui.element("table"):
         with ui.element("tr"):
             for name in header:
                 with ui.element("th"):
                     ui.label(name)
-        for row in rows:
+        for number, row in enumerate(rows):
             with ui.element("tr"):
-                for cell in row:
+                for column, cell in enumerate(row):
                     with ui.element("td"):
+                        if column == 0 and colors and colors[number]:
+                            square = ui.element("span").classes("gd-key")
+                            square.style(f"background: {colors[number]}")
                         ui.label(cell)
 
 
@@ -484,6 +533,12 @@ def object_rows(shown: Shown) -> list[tuple[str, str, str, str]]:
         )
         for o in shown.objects
     ]
+
+
+def object_colors(shown: Shown) -> list[str]:
+    """CSS colours in which the labels of the objects of a picture are drawn; empty = unknown."""
+    colors = [id_color(o.number) if o.number else None for o in shown.objects]
+    return [f"rgb{color}" if color else "" for color in colors]
 
 
 def show_full(tab: Tab, order: Order, shown: Shown) -> None:
@@ -505,7 +560,12 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
                 image.style("width: 100%")
             else:
                 image.style(f"aspect-ratio: {shape[0]} / {shape[1]}; width: {shape[0]}px")
-            state = ui.label("rendering ...")
+            # Until it is rendered, the small picture takes its place.
+            image.props["src"] = tab.desk.pictures.put(shown.jpeg)
+            progress = ui.linear_progress(show_value=False).props(
+                'indeterminate aria-label="rendering"'
+            )
+            state = ui.label("rendering in full size ...").props('role="status"')
         with ui.element("div").classes("gd-table"):
             objects = ui.element("div")
             table(
@@ -523,12 +583,15 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
     def receive(_: Any, result: Any) -> None:
         jpeg = getattr(result, "jpeg", None)
         state.text = "" if jpeg else result.text
+        progress.set_visibility(False)
         if jpeg:
             image.props["src"] = tab.desk.pictures.put(jpeg)
+            image.props["data-full"] = "ready"
             image.update()
             # Of the configured image: a small picture has other sizes, and misses small objects.
             with objects:
-                table(("class", "object", "size px", "occlusion"), object_rows(result))
+                header = ("class", "object", "size px", "occlusion")
+                table(header, object_rows(result), object_colors(result))
 
     tab.desk.order(f"{tab.key}/full", [replace(order, width_px=0)], receive)
 

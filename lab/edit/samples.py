@@ -32,7 +32,14 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.lab.edit.document import Fault, analyse
 from gen_data.lab.edit.files import ASSETS
-from gen_data.lab.edit.overlays import KINDS, LAYERS, View, draw_view, first_kind
+from gen_data.lab.edit.overlays import (
+    KINDS,
+    LAYERS,
+    View,
+    draw_view,
+    find_empty,
+    first_kind,
+)
 from gen_data.lab.edit.reuse import Memory, RememberingPhysics
 from gen_data.packs.provision import open_assets
 from gen_data.physics import open_engine
@@ -73,6 +80,7 @@ class Order:
         index: Number of the sample.
         overrides: ``KEY=VALUE`` each.
         width_px: Largest width of the rendered image; 0 = as configured.
+        pinned: Values that replace draws, by parameter as in ``Shown.draws``.
     """
 
     text: str
@@ -81,6 +89,7 @@ class Order:
     view: View
     overrides: tuple[str, ...] = ()
     width_px: int = 240
+    pinned: tuple[tuple[str, Any], ...] = ()
 
     def run(self, studio: Studio) -> Shown:
         """Render and draw it."""
@@ -117,6 +126,7 @@ class Labelled:
 
     Attributes:
         name: In the scene: that of its element and a number; empty = unknown.
+        number: Of its instance, which gives its labels their colour; 0 = unknown.
     """
 
     category: str
@@ -124,6 +134,7 @@ class Labelled:
     height_px: float
     occlusion: float | None
     name: str = ""
+    number: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +148,7 @@ class Shown:
         brightness: Mean grey value of the photograph in [0, 1]; None without one.
         per_scene, per_view: Numbers of samples.
         cpu_s: Processor time.
+        empty: Layers of the view, or its kind, of which the sample has nothing.
     """
 
     jpeg: bytes
@@ -148,6 +160,7 @@ class Shown:
     per_scene: int
     per_view: int
     cpu_s: float = 0.0
+    empty: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -218,7 +231,7 @@ class Studio:
         started_s = time.process_time()
         # Own files may be added again with another pose of the camera, or another unit.
         own = _index_time_ns(Path(order.file).parent / ASSETS)
-        text = repr((order.text, order.file, order.overrides, own))
+        text = repr((order.text, order.file, order.overrides, order.pinned, own))
         opened = self._opened.get(text, lambda: self._open(order))
         view = opened.choose_sensor(order.view)
         needed = opened.annotations(view)
@@ -236,6 +249,8 @@ class Studio:
             opened.info.views_per_scene * opened.info.steps_per_scene,
             opened.info.steps_per_scene,
             time.process_time() - started_s,
+            find_empty(taken.sample, view)
+            | ({order.view.kind} if view.kind != order.view.kind else frozenset()),
         )
 
     def record(self, order: Order) -> bytes:
@@ -270,7 +285,7 @@ class Studio:
         folders = config.asset_folders
         opened = repr([(folder, _index_time_ns(folder)) for folder in folders])
         kept = self._libraries.get(opened, lambda: Kept(open_assets(folders)))
-        return OpenedText(config, kept)
+        return OpenedText(config, kept, dict(order.pinned))
 
 
 def _index_time_ns(folder: Path) -> int:
@@ -288,13 +303,13 @@ class OpenedText:
         sensors: First kind of picture by name of every sensor that has one.
     """
 
-    def __init__(self, config: Config, kept: Kept) -> None:
+    def __init__(self, config: Config, kept: Kept, pinned: Mapping[str, Any]) -> None:
         # Formats have no pictures: whether they can hold the data set is checked before a run.
         factory = PipelineFactory(replace(config, exporters=()), n=1)
         vars(factory)["library"] = library = kept.library
         renderer = kept.renderer(repr(config.render), lambda: factory.renderer)
         vars(factory)["renderer"] = renderer
-        self._config, self.library = config, library
+        self._config, self.library, self._pinned = config, library, pinned
         self._draws: dict[str, list[Draw]] = {}
         self._memory, self._nominal = kept.memory, factory.nominal
         self._physics = kept.physics(config.general.physics)
@@ -341,7 +356,8 @@ class OpenedText:
 
     def sample(self, index: int) -> Sample:
         """A whole sample, as in a data set."""
-        self._pipeline.config = self._settings
+        open_scene = self._observed_scene if self._pinned else self._settings.open_scene
+        self._pipeline.config = replace(self._settings, open_scene=open_scene)
         return self._pipeline.sample(index)
 
     def take(self, index: int, view: View, width_px: int) -> Taken:
@@ -416,7 +432,9 @@ class OpenedText:
             ),
         )
         self._draws["shared"] = list(shared_draws(config, nominal))
-        observed = [Observed(one, self._draws, self._memory) for one in scene.randomizers]
+        observed = [
+            Observed(one, self._draws, self._memory, self._pinned) for one in scene.randomizers
+        ]
         return nominal, observed, scene.sensors
 
     def _known_nominal(self, nominal: Scene) -> Scene:
@@ -450,9 +468,15 @@ class Observed:
     motion_duration_s: float | None = None
 
     def __init__(
-        self, randomizer: Randomizer, draws: dict[str, list[Draw]], memory: Memory
+        self,
+        randomizer: Randomizer,
+        draws: dict[str, list[Draw]],
+        memory: Memory,
+        pinned: Mapping[str, Any],
     ) -> None:
         self.name, self.stage = randomizer.name, randomizer.stage
+        own = f"{self.name}."
+        self._pinned = {name: value for name, value in pinned.items() if name.startswith(own)}
         self._randomizer, self._draws, self._memory = randomizer, draws, memory
 
     def __call__(self, scene: Scene, assets: AssetLibrary, rng: Rng) -> Scene:
@@ -460,9 +484,15 @@ class Observed:
 
         def draw() -> tuple[Scene, list[Draw]]:
             log: list[Draw] = []
-            return observe_randomizer(self._randomizer, log)(scene, assets, rng), log
+            observed = observe_randomizer(self._randomizer, log, self._pinned)
+            return observed(scene, assets, rng), log
 
-        settings = (type(self._randomizer), repr(self._randomizer), rng.streams)
+        settings = (
+            type(self._randomizer),
+            repr(self._randomizer),
+            rng.streams,
+            repr(self._pinned),
+        )
         drawn, self._draws[self.name] = self._memory.get(scene, settings, draw)
         return drawn
 
@@ -489,7 +519,12 @@ def _objects(taken: Taken, sensor: str) -> Iterator[Labelled]:
             width, height = item.box.x_max - item.box.x_min, item.box.y_max - item.box.y_min
             kind, factor = item.instance.category, taken.factor
             yield Labelled(
-                kind, width / factor, height / factor, item.occlusion, item.instance.name
+                kind,
+                width / factor,
+                height / factor,
+                item.occlusion,
+                item.instance.name,
+                item.instance.instance_id,
             )
 
 

@@ -11,7 +11,7 @@ from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import GenDataError, StorageError
 from gen_data.lab.edit import text_edits
 from gen_data.lab.edit.document import Analysis, Fault, analyse, find_faults
-from gen_data.lab.edit.files import Folders, OpenedFile
+from gen_data.lab.edit.files import Folders, OpenedFile, read_file
 from gen_data.lab.edit.overlays import View
 from gen_data.lab.edit.photographs import is_empty
 from gen_data.lab.edit.samples import Check, Order, Shown
@@ -39,13 +39,22 @@ class Variation:
     Attributes:
         field: Dotted path, as for ``--set``.
         values: Plain data, one a picture.
-        frozen: ``KEY=VALUE`` texts of the other draws of the same plug-in.
+        kept: Names and values of the other draws of the same plug-in.
+        drawn: Name of the draw that the values replace; empty = the field is a constant.
     """
 
     index: int
     field: str
     values: tuple[Any, ...]
-    frozen: tuple[str, ...] = ()
+    kept: tuple[tuple[str, Any], ...] = ()
+    drawn: str = ""
+
+    def order(self, order: Order, value: Any) -> Order:
+        """The order of the picture with a value."""
+        order = replace(order, index=self.index)
+        if self.drawn:
+            return replace(order, pinned=(*self.kept, (self.drawn, value)))
+        return replace(order, pinned=self.kept, overrides=(f"{self.field}={to_flow_yaml(value)}",))
 
 
 @dataclass(frozen=True)
@@ -103,8 +112,18 @@ class Session:
 
     @property
     def is_changed(self) -> bool:
-        """Whether the text differs from the file."""
-        return self.text != self.file.text
+        """Whether the text differs from the file, or there is no file yet."""
+        return self.file.content is None or self.text != self.file.text
+
+    def find_change(self) -> str:
+        """What another program has done to the file since it was read; empty for nothing."""
+        try:
+            content = read_file(self.file.path).content
+        except GenDataError:
+            return "cannot be read any more"
+        if content == self.file.content:
+            return ""
+        return "has changed on disk" if content is not None else "is gone from disk"
 
     def set_text(self, text: str) -> None:
         """Take a text and find the faults of its first scene; the latest valid configuration stays.
@@ -139,8 +158,7 @@ class Session:
         if varied is None:
             orders = [replace(order, index=index) for index in self.grid.indices(config)]
         else:
-            changed = [(*varied.frozen, f"{varied.field}={to_flow_yaml(v)}") for v in varied.values]
-            orders = [replace(order, index=varied.index, overrides=texts) for texts in changed]
+            orders = [varied.order(order, value) for value in varied.values]
         self.results = {k: r for k, r in self.results.items() if k < len(orders)}
         self.outdated &= set(self.results)
         return orders
@@ -158,6 +176,12 @@ class Session:
         refused = (r for k, r in sorted(self.results.items()) if k not in self.outdated)
         texts = dict.fromkeys(one.text for one in refused if isinstance(one, Refused))
         return tuple(fault for text in texts for fault in find_faults(text, self.name))
+
+    @property
+    def empty(self) -> list[str]:
+        """Kinds of labels and pictures of which no picture of the current text has anything."""
+        found = [one.empty for one in self.shown]
+        return sorted(frozenset.intersection(*found)) if found else []
 
     @property
     def shown(self) -> list[Shown]:
@@ -212,8 +236,9 @@ class Session:
 def vary(shown: Shown, section: str, name: str, field_: str, values: Sequence[Any]) -> Variation:
     """The sample of a picture with several values of one field of an item.
 
-    Other draws of the same randomizer are fixed where it drew one number each; those of other
-    plug-ins have streams of their own, and stay anyway.
+    A value takes the place of the drawn one, whose random numbers are drawn all the same: other
+    draws stay. Those of the same randomizer that are one number are kept also where another
+    attempt has to be made; those of other plug-ins have streams of their own.
 
     Args:
         shown: Picture of the sample.
@@ -222,19 +247,20 @@ def vary(shown: Shown, section: str, name: str, field_: str, values: Sequence[An
         field_: The field that varies.
         values: Its values.
     """
-    frozen = tuple(
-        f"randomizers.{drawn}={to_flow_yaml(found[0])}"
+    own = f"{name}.{field_}" if section == "randomizers" else ""
+    kept = tuple(
+        (drawn, found[0])
         for drawn, found in shown.draws.items()
         if section == "randomizers"
         and drawn.rpartition(".")[0] == name
-        and drawn != f"{name}.{field_}"
+        and drawn != own
         and len(found) == 1
         and isinstance(found[0], (int, float))
         and not isinstance(found[0], bool)
         and "[" not in drawn
     )
     place = ".".join(part for part in (section, name, field_) if part)
-    return Variation(shown.index, place, tuple(values), frozen)
+    return Variation(shown.index, place, tuple(values), kept, own if own in shown.draws else "")
 
 
 def drawn_values(shown: Sequence[Shown], parameter: str) -> list[Any]:

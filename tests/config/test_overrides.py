@@ -75,8 +75,8 @@ def test_an_overridden_value_knows_that_it_came_from_the_command_line(document: 
         ("seed.x", "1", 6, "seed: is 7, so it has no 'x'"),
         ("a..b", "1", 2, "'a..b' is not a path; expected the form a.b[0].c"),
         ("", "1", 1, "an empty path"),
-        ("camera.fov_deg", "[1, 2", 16, "camera.fov_deg[2]: not valid YAML: while parsing a flow "
-         "sequence, did not find expected ',' or ']'"),
+        ("camera.fov_deg", "[1, 2", 16, "camera.fov_deg[2]: not valid YAML: the list that began "
+         "with '[' goes on; expected ',' and another value, or ']'"),
         ("camera.fov_deg", "!!float 1", 16,
          "camera.fov_deg: tag tag:yaml.org,2002:float is not allowed"),
         ("camera.fov_deg", ".nan", 16, "camera.fov_deg: .nan is not a finite number"),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from gen_data.exporters.label_colors import id_color
 from gen_data.lab.edit.overlays import View
 from gen_data.lab.edit.samples import Order, Studio
 from tests.edit.live_page import (
@@ -142,6 +143,18 @@ def test_sliders_follow_a_text_that_is_typed(page: Page) -> None:
     page.keyboard.type("7")
     page.wait_for_selector("[data-field=scale] [aria-valuenow='0.91|17.25']")
     assert float(slider.get_attribute("aria-valuemax") or 0) >= 17.25
+    # Each end has a field for the keyboard.
+    least = page.locator("[data-field=scale] [data-end=min]")
+    assert least.input_value() == "0.91"
+    least.fill("0.8")
+    page.wait_for_function(
+        "document.querySelector('.cm-content').textContent.includes('{uniform: [0.8, 17.25]}')"
+    )
+    page.locator("[data-field=scale] [data-end=max]").fill("1.5")
+    page.wait_for_function(
+        "document.querySelector('.cm-content').textContent.includes('{uniform: [0.8, 1.5]}')"
+    )
+    page.wait_for_selector("[data-field=scale] [aria-valuenow='0.8|1.5']")
     # A number that is typed next to a slider goes into the text, too.
     count = page.locator("[data-field=count] input")
     count.fill("21")
@@ -191,6 +204,45 @@ def test_each_view_has_the_pictures_that_the_library_draws(live: Live, page: Pag
     for layer in ("keypoints", "boxes3d"):
         layers ^= {layer}
         expect(replace(start, layers=layers), partial(page.click, f"[data-layer={layer}]"))
+
+
+def test_kinds_of_labels_without_any_are_told(page: Page) -> None:
+    """Tables have neither lanes nor mirrors; the note goes with the choice."""
+    for act, told in (
+        ("[data-layer=lanes]", "these samples have no lanes"),
+        ("[data-layer=text]", "these samples have no lanes, no words"),
+    ):
+        page.click(act)
+        page.wait_for_selector(f".gd-empty:text-is('{told}')")
+    page.click("[data-layer=lanes]")
+    page.click("[data-layer=text]")
+    page.wait_for_selector(".gd-empty", state="hidden")
+    page.click("label:has-text('picture') >> nth=0")
+    page.click(".q-item:has-text('LiDAR from above')")
+    page.wait_for_selector(".gd-empty:text-is('these samples have no LiDAR from above')")
+    page.click("label:has-text('picture') >> nth=0")
+    page.click(".q-item:has-text('photograph')")
+    page.wait_for_selector(".gd-empty", state="hidden")
+
+
+def test_a_file_that_another_program_changes_or_deletes_is_told(live: Live, page: Page) -> None:
+    """Within a few seconds; saving asks, and writes the text of the page."""
+    saved = live.read()
+    (live.folder / "mine.yaml").write_text("seed: 3\n")
+    page.wait_for_selector("[role=status]:text-is('not saved: the file has changed on disk')")
+    (live.folder / "mine.yaml").unlink()
+    page.wait_for_selector("[role=status]:text-is('not saved: the file is gone from disk')")
+    put_cursor(page, "# My table")
+    page.keyboard.press("Control+s")
+    page.wait_for_selector(".q-dialog:has-text('is gone since it was read')")
+    page.click("button:has-text('Overwrite')")
+    page.wait_for_selector("[role=status]:text-is('saved')")
+    assert live.read().decode().replace("\r\n", "\n") == LINES
+    (live.folder / "mine.yaml").write_bytes(saved)
+    page.wait_for_selector("[role=status]:text-is('not saved: the file has changed on disk')")
+    page.keyboard.press("Control+s")
+    page.click("button:has-text('Overwrite')")
+    page.wait_for_selector("[role=status]:text-is('saved')")
 
 
 def test_a_scanner_has_its_view_from_above(live: Live, page: Page) -> None:
@@ -250,13 +302,19 @@ def test_a_sample_in_full_size_has_its_draws_and_a_recording(live: Live, page: P
     """The recording is a file for the Rerun viewer."""
     page.click(".gd-tile >> nth=1")
     page.wait_for_selector(".q-dialog td:has-text('clutter.upright')")
-    page.wait_for_selector(".q-dialog img[src]")
+    # Before the full size is rendered, the small picture takes its place.
+    page.wait_for_function("document.querySelector('.q-dialog img')?.naturalWidth > 0")
+    page.wait_for_selector(".q-dialog img[data-full=ready]")
     from gen_data.lab.edit.panels import object_rows  # It needs NiceGUI.
 
     # Sizes are those of the picture in full size.
     shown = Studio().show(Order(text_of(page), str(live.folder / "mine.yaml"), 1, View(), (), 0))
     cells = page.locator(".q-dialog table").first.locator("td").all_inner_texts()
     assert cells == [cell for row in object_rows(shown) for cell in row]
+    assert page.locator(".q-dialog img").evaluate("e => e.naturalWidth") == 640
+    assert page.locator(".q-dialog .q-linear-progress:visible").count() == 0
+    keys = page.locator(".q-dialog .gd-key").evaluate_all("all => all.map(e => e.style.background)")
+    assert keys == [f"rgb{id_color(o.number)}" for o in shown.objects]
     with page.expect_download() as download:
         page.click("button:has-text('Recording for Rerun')")
     assert download.value.suggested_filename == "sample_000001.rrd"
@@ -275,7 +333,7 @@ def test_one_sample_has_a_low_a_middle_and_a_high_value(page: Page) -> None:
     assert page.locator(".gd-tile").count() == 3
     page.click(".gd-tile >> nth=2")
     page.wait_for_selector(".q-dialog .gd-name:text-is('sample 1')")
-    page.wait_for_selector(".q-dialog img[src]")
+    page.wait_for_selector(".q-dialog img[data-full=ready]")
     assert page.locator(".q-dialog table").first.locator("tr").count() == 1 + 6
     page.click(".q-dialog button:has-text('Close')")
     page.click("button:has-text('All samples')")

@@ -152,6 +152,7 @@ def fit(page: Page) -> None:
     page.fill("[data-fit=scenes]", "4")
     page.click("button:has-text('Fit to the real pictures')")
     page.wait_for_selector("[role=status]:has-text('fitting: ')")
+    assert page.locator("button:has-text('Fit to the real pictures')").is_disabled()
     page.click("button:has-text('Cancel'):visible")
     page.wait_for_selector("[role=status]:has-text('the fit was cancelled')")
     page.click("button:has-text('Fit to the real pictures')")

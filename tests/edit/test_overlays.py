@@ -11,8 +11,10 @@ from gen_data.core.scene import Camera, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters.label_colors import color_ids
 from gen_data.exporters.label_parts import BORDER_COLORS
-from gen_data.lab.edit.overlays import View, draw_view
+from gen_data.lab.edit.overlays import View, draw_view, find_empty
 from gen_data.lab.edit.samples import Order, Studio
+from gen_data.preview.depth_scale import draw_depth_scale, scale_labels
+from gen_data.preview.palette import color_depth
 
 CAMERA = Camera("color", SE3(), Intrinsics(80, 60, 50.0, 50.0, 40.0, 30.0))
 EDGE = BorderTruth("a:right", "edge", ((60.5, 50.5), (60.5, 10.5)), (True, True))
@@ -23,8 +25,8 @@ def sample() -> Sample:
     """A grey image with the edge of a carriageway, two layers, and a mirror."""
     channels = {
         Channel.RGB: np.full((60, 80, 3), 90, np.uint8),
-        Channel.INSTANCE_LAYERS: LAYERS,
-        Channel.SEEN_IN_MIRROR: LAYERS[..., 1],
+        Channel.INSTANCE_LAYERS: LAYERS.copy(),
+        Channel.SEEN_IN_MIRROR: LAYERS[..., 1].copy(),
     }
     reading = SensorReading("color", CAMERA, channels)
     truth = {"color": ImageTruth(CAMERA, (), borders=(EDGE,))}
@@ -46,6 +48,37 @@ def test_layers_are_side_by_side_and_mirrors_show_their_instances() -> None:
     np.testing.assert_array_equal(layers, expected)
     mirrors = draw_view(sample(), View("mirrors", "color"), {}, 1.0)
     np.testing.assert_array_equal(mirrors, color_ids(LAYERS[..., 1]))
+
+
+def test_layers_of_which_a_sample_has_nothing_are_named() -> None:
+    """Borders are there, boxes and words are not; a second layer and a mirror are."""
+    view = View(sensor="color", layers=frozenset({"lanes", "boxes", "text"}))
+    assert find_empty(sample(), view) == {"boxes", "text"}
+    assert find_empty(sample(), View("layers", "color")) == set()
+    assert find_empty(sample(), View("mirrors", "color")) == set()
+    assert find_empty(sample(), View("depth", "color")) == {"depth"}
+    plain = sample()
+    plain.capture.readings["color"].channels[Channel.SEEN_IN_MIRROR][:] = 0  # type: ignore[index]
+    plain.capture.readings["color"].channels[Channel.INSTANCE_LAYERS][..., 1] = 0  # type: ignore[index]
+    assert find_empty(plain, View("mirrors", "color")) == {"mirrors"}
+    assert find_empty(plain, View("layers", "color")) == {"layers"}
+
+
+def test_a_depth_image_has_a_scale_in_metres() -> None:
+    """Of the 1st to the 99th percentile: bright is near; nothing has none."""
+    depth_m = np.tile(np.linspace(1.0, 21.0, 200, dtype=np.float32), (100, 1))
+    assert scale_labels(depth_m) == ("1.2 m", "21 m")
+    image = color_depth(depth_m)
+    draw_depth_scale(image, depth_m, 1.0)
+    bar = image[-2].astype(int)  # Below the letters.
+    assert (np.diff(bar[:, 0]) <= 0).all()
+    assert (bar[0, 0], bar[-1, 0]) == (255, 40)
+    np.testing.assert_array_equal(image[:-13], color_depth(depth_m)[:-13])
+    nothing = np.full((100, 200), np.inf, np.float32)
+    assert scale_labels(nothing) == ("", "")
+    image = color_depth(nothing)
+    draw_depth_scale(image, nothing, 1.0)
+    assert not image.any()
 
 
 @pytest.mark.slow

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import asyncio
+import errno
+import os
 import re
 import socket
 from collections.abc import MutableMapping
@@ -14,18 +16,22 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gen_data.config.distributions import Uniform, UniformInteger
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
+from gen_data.core.streams import Streams
 from gen_data.lab.edit import data_sets, own_files, server
 from gen_data.lab.edit.desk import Pictures
-from gen_data.lab.edit.files import Folders, OpenedFile
+from gen_data.lab.edit.files import ChangedError, Folders, OpenedFile, read_file
 from gen_data.lab.edit.reuse import Memory
 from gen_data.lab.edit.samples import Check, Labelled, Shown, Studio, shrink
 from gen_data.lab.edit.server import COOKIE, Guard, free_port, usual_port
 from gen_data.lab.edit.session import Session, vary
 from gen_data.lab.edit.statistics import rows, summarise
 from gen_data.lab.edit.workers import Queue, Ready, Refused, Ticket
+from gen_data.randomizers.lighting import Lighting
+from gen_data.report.drawn_parameters import Draw, observe_randomizer
 
 SHOWN = Shown(
     b"jpeg",
@@ -232,14 +238,97 @@ def test_faults_of_scenes_are_faults_of_the_text(tmp_path: Path) -> None:
 
 
 def test_one_field_varies_and_all_other_draws_stay(tmp_path: Path) -> None:
-    """Draws of the same randomizer are fixed if it drew one number; others have own streams."""
+    """A drawn field is pinned, a constant one overridden; single numbers of the item are kept."""
     session = make_session(tmp_path, "extends: tabletop.yaml\n")
     varied = vary(SHOWN, "randomizers", "orbit", "distance_m", (0.9, 1.2))
     session.grid = replace(session.grid, variation=varied)
-    assert [(order.index, order.overrides) for order in session.orders()] == [
-        (5, ("randomizers.orbit.roll_deg=3", "randomizers.orbit.distance_m=0.9")),
-        (5, ("randomizers.orbit.roll_deg=3", "randomizers.orbit.distance_m=1.2")),
+    kept = ("orbit.roll_deg", 3.0)
+    assert [(order.index, order.overrides, order.pinned) for order in session.orders()] == [
+        (5, (), (kept, ("orbit.distance_m", 0.9))),
+        (5, (), (kept, ("orbit.distance_m", 1.2))),
     ]
+    varied = vary(SHOWN, "randomizers", "orbit", "jitter_m", (0.1,))
+    session.grid = replace(session.grid, variation=varied)
+    (order,) = session.orders()
+    assert order.overrides == ("randomizers.orbit.jitter_m=0.1",)
+    assert order.pinned == (("orbit.distance_m", 1.2), kept)
+
+
+def test_a_pinned_draw_takes_its_random_numbers() -> None:
+    """Those after it are drawn as without the pin, and the log has the pinned value."""
+    lamp = Lighting(name="lamps", count=UniformInteger(1, 3), temperature_k=Uniform(2700, 6500))
+    logs: list[list[Draw]] = [[], []]
+    for log, pinned in zip(logs, ({}, {"lamps.count": 9}), strict=True):
+        observed: Any = observe_randomizer(lamp, log, pinned)
+        rng = Streams(0, 0).rng("randomizer/lamps")
+        assert observed.count.draw(rng) == log[0][2]
+        observed.temperature_k.draw(rng)
+    assert logs[1][0][2] == 9 != logs[0][0][2]
+    assert logs[0][1][2] == logs[1][1][2]
+
+
+def test_a_text_without_a_file_is_not_saved_until_there_is_one(tmp_path: Path) -> None:
+    """Also an empty one; a full disk leaves the old file, and the text unsaved."""
+    session = Session(OpenedFile(tmp_path / "a.yaml", None), Folders((tmp_path,)))
+    assert session.is_changed
+    session.save()
+    assert not session.is_changed
+    assert (tmp_path / "a.yaml").read_bytes() == b""
+
+
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The message is that of the system, and is no question to reload or overwrite."""
+    path = tmp_path / "a.yaml"
+    path.write_text("seed: 1\n")
+    session = Session(read_file(path), Folders((tmp_path,)))
+    session.text = "seed: 2\n"
+
+    def fill(file: Path, data: bytes) -> int:
+        with file.open("wb") as begun:
+            begun.write(data[:3])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(file))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_bytes", fill)
+        with pytest.raises(StorageError, match="No space left on device") as caught:
+            session.save()
+    assert not isinstance(caught.value, ChangedError)
+    assert (path.read_text(), session.is_changed) == ("seed: 1\n", True)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.yaml"]
+    session.save()
+    assert path.read_text() == "seed: 2\n"
+
+
+def test_a_file_that_another_program_changes_or_deletes_is_told(tmp_path: Path) -> None:
+    """Saving asks first; written again, it is as the editor has it."""
+    path = tmp_path / "a.yaml"
+    path.write_text("seed: 1\n")
+    session = Session(read_file(path), Folders((tmp_path,)))
+    assert session.find_change() == ""
+    path.write_text("seed: 5\n")
+    assert session.find_change() == "has changed on disk"
+    with pytest.raises(ChangedError, match="has changed since it was read"):
+        session.save()
+    path.write_bytes(b"\xff")
+    assert session.find_change() == "cannot be read any more"
+    path.unlink()
+    assert session.find_change() == "is gone from disk"
+    with pytest.raises(ChangedError, match="is gone since it was read; overwrite it"):
+        session.save()
+    session.save(overwrite=True)
+    assert path.read_text() == "seed: 1\n"
+    assert session.find_change() == ""
+
+
+def test_layers_that_no_picture_has_are_told(tmp_path: Path) -> None:
+    """Of the pictures of the current text only; one that has them is enough."""
+    session = make_session(tmp_path, "extends: tabletop.yaml\n")
+    orders = session.orders()
+    for slot, empty in enumerate(({"lanes", "text"}, {"text"})):
+        session.accept(Ticket("a", slot, orders[slot]), replace(SHOWN, empty=frozenset(empty)))
+    assert session.empty == ["text"]
+    session.orders()
+    assert session.empty == []
 
 
 def test_statistics_count_boxes_per_picture() -> None:

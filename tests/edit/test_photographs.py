@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,8 @@ import pytest
 import yaml
 
 from gen_data.assemble.config import parse_config
+from gen_data.assets.folder_index import PlateEntry
+from gen_data.assets.plates.plate_import import locate_camera
 from gen_data.core.errors import AssetError, ConfigError
 from gen_data.lab.edit.own_files import Checked, CheckFile, Misplaced, add_to_scene, keep_file
 from gen_data.lab.edit.photographs import (
@@ -25,6 +29,7 @@ from gen_data.lab.edit.photographs import (
     show_behind,
 )
 from gen_data.lab.edit.samples import Studio
+from gen_data.preview.plate_overlay import axes_px, plate_overlay
 
 
 def test_an_entry_has_the_horizon_of_the_tilt() -> None:
@@ -146,3 +151,23 @@ def test_a_scene_without_a_plate_is_told() -> None:
         show_behind("extends: tabletop.yaml\n", document, "user/a")
     assert is_empty("# only\n\n  # comments\n")
     assert not is_empty("# a\nseed: 1\n")
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 12.0])
+def test_arrows_on_the_ground_follow_the_camera_and_the_horizon_its_roll(roll_deg: float) -> None:
+    """The arrow to the right is parallel to the horizon; the one ahead leads up."""
+    standpoint = Standpoint(0.6, 45.0, 90.0, roll_deg=roll_deg)
+    image = np.full((600, 800, 3), 90, np.uint8)
+    data = cv2.imencode(".png", image)[1].tobytes()
+    entry = PlateEntry.model_validate_json(json.dumps(standpoint.entry("a.png", data, (800, 600))))
+    plate = replace(
+        locate_camera(entry, data, image, "a.png"),
+        ground_px=((300.0, 400.0), (300.0, 200.0), (500.0, 200.0), (500.0, 400.0)),
+    )
+    (x, y), (end_x, end_y) = axes_px(plate)["right"]
+    assert end_x > x
+    assert math.degrees(math.atan2(end_y - y, end_x - x)) == pytest.approx(roll_deg, abs=1e-6)
+    (x, y), (end_x, end_y) = axes_px(plate)["ahead"]
+    assert end_y < y
+    shown = plate_overlay(plate, image)
+    assert (shown != image).any()

@@ -61,9 +61,9 @@ def test_scenes_stay_when_only_a_camera_develops_differently(
     drawn: list[str] = []
     opened: list[Engine] = []
 
-    def spy(randomizer: Any, log: Any) -> Any:
+    def spy(randomizer: Any, *arguments: Any) -> Any:
         drawn.append(randomizer.name)
-        return observe_randomizer(randomizer, log)
+        return observe_randomizer(randomizer, *arguments)
 
     def spy_on_engines(*arguments: Any) -> Engine:
         opened.append(open_engine(*arguments))
@@ -128,3 +128,23 @@ def test_a_small_picture_shows_the_sample_of_the_run() -> None:
     kept = {k: v for k, v in shown.draws.items() if not k.startswith("orbit.")}
     assert kept == {k: v for k, v in nearer.items() if not k.startswith("orbit.")}
     assert replace(order, width_px=0).run(studio).objects != shown.objects
+
+
+@pytest.mark.slow
+def test_a_varied_count_adds_objects_to_those_that_are_there() -> None:
+    """Each picture begins with the objects of the smaller count; other draws stay."""
+    studio = Studio()
+    order = Order(TEXT, "x.yaml", 1, View(), (), 64)
+    plain = studio.show(order).draws
+    assets = []
+    for count in (2, 5):
+        opened = studio._open(replace(order, pinned=(("clutter.count", count),)))
+        taken = opened.take(1, opened.choose_sensor(View()), 64)
+        assets.append([b.asset for b in taken.sample.scene.bodies if b.name.startswith("clutter")])
+        for name, values in taken.draws.items():
+            # A camera looks for a free place between other objects.
+            if not name.startswith(("clutter.", "orbit.", "lens.")):
+                least = min(len(values), len(plain[name]))
+                assert values[:least] == plain[name][:least], name
+    assert [len(one) for one in assets] == [2, 5]
+    assert assets[1][:2] == assets[0]
