@@ -25,6 +25,8 @@ HALF_M = 1.5
 _RAIL_FROM_M, _RAIL_M = 1.0, 1.0
 """Height of a wall from which on it has a railing, and the height of that."""
 _BATTER, _BACK_SLOPE = 0.1, 1.0 / 1.5
+_TOE_M = 0.05
+"""The front of the foot: the origin is under the wall."""
 
 
 def retaining_wall(seed: int, style: str) -> Solid:
@@ -45,10 +47,10 @@ def retaining_wall(seed: int, style: str) -> Solid:
     grass = Material(roughness=0.95, texture=f"texture/grass?seed={seed % 4}", role="grass")
     metal = painted_material("#3b3d3f", 0.45) if rng.chance(0.5, "painted") else GALVANISED
     stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9, (0.86, 0.84, 0.8))
-    edge = [(x, y, z) for x, z in ground for y in (-HALF_M, HALF_M)]
-    hull = hulls.box((behind, -HALF_M, 0.0), (0.0, HALF_M, high))
+    edge = [(x + _TOE_M, y, z) for x, z in ground for y in (-HALF_M, HALF_M)]
+    hull = hulls.box((behind + _TOE_M, -HALF_M, 0.0), (_TOE_M, HALF_M, high))
     skins = (_skin(kind, rng), grass, stone, metal)
-    return make_solid(parts, skins, [hull, np.array(edge)])
+    return make_solid([part.moved(_TOE_M) for part in parts], skins, [hull, np.array(edge)])
 
 
 def retaining_wall_facts(seed: int, style: str) -> Facts:
