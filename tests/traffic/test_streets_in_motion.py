@@ -195,8 +195,8 @@ def test_people_walk_in_step() -> None:
 
     A small child that runs takes more of them than the simulation has steps.
     """
-    scenes = (scene_of(1), scene_of(3))
-    walkers = [(s, t) for s in scenes for t in s.tracks if t.body.startswith("people/")]
+    scenes = map(scene_of, range(1, 9))
+    walkers = ((s, t) for s in scenes for t in s.tracks if t.body.startswith("people/"))
     checked = 0
     for scene, track in walkers:
         a, b = (np.array(track.pose(t).translation_m[:2]) for t in (0.5, 2.5))
@@ -211,7 +211,9 @@ def test_people_walk_in_step() -> None:
         sixteenths = min(16.0 * way / (0.8 * height), 2.0 / simulation.STEP_S)
         assert len(steps) == pytest.approx(sixteenths, abs=2.5)
         checked += 1
-    assert checked == 2
+        if checked == 3:
+            return
+    pytest.fail(f"{checked} people walk in eight scenes, too few to check")
 
 
 @pytest.mark.slow
