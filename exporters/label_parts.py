@@ -21,14 +21,7 @@ from gen_data.core.sample import (
     SensorTracks,
 )
 from gen_data.core.scene import Scene
-from gen_data.exporters.label_colors import (
-    SURFACE_COLORS,
-    UNLABELLED,
-    Rgb,
-    UInt8,
-    color_positions,
-    id_color,
-)
+from gen_data.exporters.label_colors import SURFACE_COLORS, UNLABELLED, Rgb, UInt8, id_color
 
 LIFT_M = 0.05
 """Height of trajectories above the path of a body's origin, and of lanes above the ground."""
@@ -104,17 +97,20 @@ def surface_voxels(
     return grid.centers_m(np.argwhere(shown)), voxel_colors(grid, categories)[shown]
 
 
-def mirrored_points(position_m: NDArray[np.float32]) -> tuple[NDArray[np.float32], UInt8]:
+def mirrored_points(
+    position_m: NDArray[np.float32], colored: UInt8
+) -> tuple[NDArray[np.float32], UInt8]:
     """Points that mirrors show, of every fourth pixel of every fourth row.
 
-    ``position_m`` is the channel ``mirrored_position`` [h, w, 3].
+    Args:
+        position_m: The channel ``mirrored_position`` [h, w, 3].
+        colored: Its picture, uint8 [h, w, 3].
 
     Returns:
-        Places in the world frame [m], [n, 3], and the colours of their pixels in the coloured
-        channel, uint8 [n, 3].
+        Places in the world frame [m], [n, 3], and the colours of their pixels, uint8 [n, 3].
     """
     thinned = np.s_[MIRROR_STEP_PX // 2 :: MIRROR_STEP_PX, MIRROR_STEP_PX // 2 :: MIRROR_STEP_PX]
-    places_m, colors = position_m[thinned], color_positions(position_m)[thinned]
+    places_m, colors = position_m[thinned], colored[thinned]
     seen = np.isfinite(places_m).all(axis=-1)
     return places_m[seen], colors[seen]
 

@@ -205,7 +205,7 @@ def _mirrored_entities(
     pictures, found = [], []
     for position_m in images:
         pictures.append(color_positions(position_m))
-        found.append(label_parts.mirrored_points(position_m))
+        found.append(label_parts.mirrored_points(position_m, pictures[-1]))
     yield f"channels/{camera}/mirrored_position", rows, _colored_columns(pictures)
     places_m, colors = (np.concatenate(parts) for parts in zip(*found, strict=True))
     if len(places_m):

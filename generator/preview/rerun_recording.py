@@ -235,12 +235,11 @@ class Recorder:
             elif channel is Channel.CATEGORY:
                 self.stream.log(f"channels/{name}/category", rr.SegmentationImage(data))
             else:
-                colored = rr.Image(overlay.channel_image(reading, channel)).compress(90)
-                self.stream.log(f"channels/{name}/{channel.value}", colored)
-        if Channel.MIRRORED_POSITION in reading.channels:
-            mirrored = reading.channels[Channel.MIRRORED_POSITION]
-            places_m, colors = label_parts.mirrored_points(mirrored)
-            self.stream.log(f"world/mirrored/{name}", rr.Points3D(places_m, colors=colors))
+                colored = overlay.channel_image(reading, channel)
+                self.stream.log(f"channels/{name}/{channel.value}", rr.Image(colored).compress(90))
+                if channel is Channel.MIRRORED_POSITION:
+                    places_m, colors = label_parts.mirrored_points(data, colored)
+                    self.stream.log(f"world/mirrored/{name}", rr.Points3D(places_m, colors=colors))
         self._record_truth(f"{path}/image", truth)
 
     def _record_truth(self, path: str, truth: ImageTruth) -> None:

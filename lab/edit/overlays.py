@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from gen_data.core import plugins
-from gen_data.core.capture import Channel
+from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.interfaces import Modality, SensorInfo
 from gen_data.core.sample import Sample
 from gen_data.preview.depth_scale import draw_depth_scale
@@ -77,7 +77,7 @@ def find_empty(sample: Sample | LabelledImages, view: View) -> frozenset[str]:
         return frozenset({"scan"} if cloud is not None and not len(cloud.points) else ())
     if view.kind == "photo":
         return frozenset(layer for layer in view.layers if not _has(sample, view.sensor, layer))
-    channel = next((c for c in KINDS[view.kind] if c in reading.channels), None)
+    channel = _channel(reading, view.kind)
     if view.kind == "mirrors":
         is_empty = channel is None or not reading.channels[channel].any()
     elif view.kind == "layers":  # The first layer is the picture as it is seen anyway.
@@ -85,6 +85,11 @@ def find_empty(sample: Sample | LabelledImages, view: View) -> frozenset[str]:
     else:
         is_empty = channel is None
     return frozenset({view.kind} if is_empty else ())
+
+
+def _channel(reading: SensorReading, kind: str) -> Channel | None:
+    """The channel of a reading that a kind of picture shows; None if it has none of them."""
+    return next((c for c in KINDS[kind] if c in reading.channels), None)
 
 
 def _has(sample: Sample | LabelledImages, sensor: str, layer: str) -> bool:
@@ -127,7 +132,7 @@ def draw_view(
         if "text" in view.layers:
             draw_texts(image, sample.truth[name].texts or (), unit)
         return image
-    shown = next((c for c in KINDS[view.kind] if c in reading.channels), None)
+    shown = _channel(reading, view.kind)
     image = channel_image(reading, shown or next(iter(reading.channels)))
     if view.kind == "depth" and shown is not None:
         draw_depth_scale(image, reading.channels[shown], max(1.0, unit))
