@@ -20,6 +20,7 @@ from gen_data.assemble.plugin_tables import (
     RANDOMIZERS,
     RENDERERS,
     SENSORS,
+    find_other_list,
 )
 from gen_data.config import shared_values
 from gen_data.config.base_model import Strict
@@ -504,7 +505,8 @@ def _plugin(
         model = cast("type[Strict]", table.load(name))
         return cast("P | None", validate(node, model, problems, field))
     except errors.ConfigError as refused:
-        problems.add(where, f"{field}.{table.tag}", str(refused))
+        fact = f"{refused}{find_other_list(name, table)}"
+        problems.add(where, f"{field}.{table.tag}", fact)
         return None
 
 
@@ -519,6 +521,7 @@ def _annotations(listed: Node, problems: Problems) -> dict[str, interfaces.AnyAn
         if not isinstance(name, str) or name not in ANNOTATIONS:
             fact = f"unknown annotation {name!r}; expected one of {', '.join(ANNOTATIONS)}"
             fact += errors.did_you_mean(str(name), ANNOTATIONS)
+            fact += find_other_list(str(name), ANNOTATIONS)
             problems.add(kind.position, field, fact)
         elif kind is not node and name in made:
             problems.add(node.position, field, f"the annotation '{name}' is listed twice")

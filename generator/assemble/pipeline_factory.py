@@ -18,7 +18,7 @@ from gen_data.config.problems import Problems, refuse
 from gen_data.config.yaml_tree import find_text
 from gen_data.core import interfaces, path_names, plates
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError, ConfigWarning, Refusals, UnknownAsset
+from gen_data.core.errors import AssetError, ConfigError, ConfigWarning, Refusals
 from gen_data.core.scene import LABEL_IDS_MAX, Scene, SharedValue
 from gen_data.exporters.base import ExporterBase, check_delivery, check_image_formats
 from gen_data.exporters.label_map import MappedExporter
@@ -330,11 +330,11 @@ def nominal_scene(
     try:
         with located_errors(config.document):
             scene = build_scene(template, scene_config.elements, assets)
-    except UnknownAsset as error:
-        place = find_text(config.document, error.asset_id)
+    except AssetError as error:
+        place = find_text(config.document, error.asset_id) if error.asset_id else None
         if place is None:
             raise
-        raise UnknownAsset(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
+        raise type(error)(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
     scene = replace(
         scene,
         shared=scene_config.shared,

@@ -21,6 +21,15 @@ TABLES: Mapping[str, PluginTable[Any]] = {
 }
 """All tables by kind, for ``gen-data describe`` and the JSON Schema."""
 
+LISTS: Mapping[str, PluginTable[Any]] = {
+    "elements": ELEMENTS,
+    "randomizers": RANDOMIZERS,
+    "sensors": SENSORS,
+    "annotations": ANNOTATIONS,
+    "exporters": EXPORTERS,
+}
+"""Tables by the key of a configuration that lists their plug-ins."""
+
 CONTENT_KINDS = ("asset_family", "question", "room_place", "room_type")
 """Kinds of plug-ins that other plug-ins find by name or tag."""
 
@@ -34,6 +43,12 @@ def default_plugin(table: PluginTable[P], name: str) -> P:
         ConfigError: the name is unknown, or its class is not a plug-in of this kind.
     """
     return table.load(name)()
+
+
+def find_other_list(name: str, table: PluginTable[Any]) -> str:
+    """Which other list a plug-in belongs to, as the end of a message; empty if to none."""
+    keys = [key for key, other in LISTS.items() if other is not table and name in other]
+    return f"; '{name}' is one of the '{keys[0]}'" if keys else ""
 
 
 def third_party_packages(plugins: Iterable[object]) -> dict[str, str]:

@@ -100,12 +100,20 @@ class Library:
         self._writing: CountCache[tuple[Writing, ...]] = CountCache(_SUMMARIES)
 
     def get(self, asset_id: str) -> asset_types.Asset:
-        """Description of an asset. Raises UnknownAsset if there is none."""
+        """Description of an asset.
+
+        Raises:
+            UnknownAsset: there is none.
+            AssetError: its family does not take a parameter of the id, or not this value.
+        """
 
         def read() -> asset_types.Asset:
-            if self._is_generated(asset_id):
+            if not self._is_generated(asset_id):
+                return self._files.get(asset_id)
+            try:
                 return self._generated.get(parse_asset_id(asset_id))
-            return self._files.get(asset_id)
+            except AssetError as error:
+                raise AssetError(str(error), asset_id) from error
 
         return self._entries.get(asset_id, read)
 

@@ -51,21 +51,21 @@ class AssetWarning(UserWarning):
 
 
 class AssetError(GenDataError):
-    """An asset is missing, unreadable or unfit."""
-
-    exit_code = 3
-
-
-class UnknownAsset(AssetError):
-    """An id names no asset.
+    """An asset is missing, unreadable or unfit.
 
     Attributes:
-        asset_id: As the user wrote it.
+        asset_id: As the user wrote it, if the id is wrong; else empty.
     """
+
+    exit_code = 3
 
     def __init__(self, message: str, asset_id: str = "") -> None:
         self.asset_id = asset_id
         super().__init__(message)
+
+
+class UnknownAsset(AssetError):
+    """An id names no asset."""
 
 
 class StorageError(GenDataError):

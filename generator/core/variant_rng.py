@@ -162,6 +162,8 @@ def _find_option(name: str, asked: DrawnValue, options: Sequence[T]) -> T:
     for option in options:
         if _in_ids(option) == asked:
             return option
+    if len(options) > 2 and list(options) == list(range(len(options))):
+        raise ValueError(f"{name} expects a whole number from 0 to {len(options) - 1}")
     words = list(dict.fromkeys(str(_in_ids(option)) for option in options))
     raise ValueError(f"{name} is none of {', '.join(words)}{did_you_mean(str(asked), words)}")
 

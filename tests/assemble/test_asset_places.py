@@ -8,7 +8,7 @@ import pytest
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.config.paths import write_locations
-from gen_data.core.errors import ConfigError, UnknownAsset
+from gen_data.core.errors import AssetError, ConfigError, UnknownAsset
 
 
 @pytest.mark.parametrize("wrong", ["../../../etc/passwd", "pybullet/teddie", "muug?seed=3"])
@@ -25,6 +25,34 @@ def test_an_unknown_asset_is_told_where_it_is_named(tmp_path: Path, wrong: str) 
         pass
     assert str(told.value).startswith(f"{path}:3:28: elements")
     assert f"asset '{wrong}': unknown" in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "fact"),
+    [
+        ("desk?width_m=16", "width_m expects a number from 1.2 to 1.8"),
+        ("desk?widht_m=1.6", "did you mean 'width_m'"),
+        ("marker?number=40&dictionary=apriltag_16h5", "number expects a whole number from 0 to 29"),
+        ("marker?dictionary=apriltag", "did you mean 'apriltag_"),
+        ("desk?seed=-1", "seed is not an integer"),
+    ],
+)
+def test_a_wrong_parameter_of_an_asset_is_told_where_it_is_named(
+    tmp_path: Path, wrong: str, fact: str
+) -> None:
+    """The id as it is written, not in the order of the library."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "template: tabletop\n"
+        "elements:\n"
+        f"  clutter: {{assets: {{ids: ['{wrong}']}}}}\n"
+        "sensors: [{type: rgb_camera, name: color}]\n"
+    )
+    with pytest.raises(AssetError) as told, open_pipeline(load_config(str(path))):
+        pass
+    family = wrong.partition("?")[0]
+    assert str(told.value).startswith(f"{path}:3:28: elements[3].assets.ids[0]: asset '{family}")
+    assert fact in str(told.value)
 
 
 def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: Path) -> None:

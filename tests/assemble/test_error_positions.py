@@ -26,6 +26,21 @@ def test_names_counts_and_repetitions_are_refused_when_read(override: str, messa
     assert str(caught.value).startswith(message)
 
 
+@pytest.mark.parametrize(("override", "place", "key"), [
+    ("randomizers=[{type: prop, name: tag}]", "--set:1:21: randomizers[0].type: ", "elements"),
+    ("elements=[{type: weather, name: sky}]", "--set:1:18: elements[0].type: ", "randomizers"),
+    ("annotations=[coco]", "--set:1:14: annotations[0]: ", "exporters"),
+    ("exporters=[{type: tracks}]", "--set:1:19: exporters[0].type: ", "annotations"),
+])  # fmt: skip
+def test_a_plugin_in_the_wrong_list_is_told_its_list(override: str, place: str, key: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_config("tabletop.yaml", overrides=[override])
+
+    first = str(caught.value).splitlines()[0]
+    assert first.startswith(f"{place}unknown "), first
+    assert first.endswith(f" is one of the '{key}'"), first
+
+
 def test_a_device_that_the_machine_lacks_is_refused_with_its_place() -> None:
     """No machine has a hundred GPUs; those that exist are named."""
     config = load_config("tabletop.yaml", overrides=["render.device=cuda:99"])
