@@ -90,7 +90,7 @@ class Rerun(base.ExporterBase):
             ConfigError: it is not installed.
         """
         del info
-        base.check_installed(self.type, "rerun")
+        base.check_installed(self.type, "rerun", "xxhash")
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a JSON line per sample; images and points are read when files are merged."""

@@ -5,8 +5,8 @@ on the clock or the process: ids of chunks and rows, the id of the first message
 columns in the footer's schema. Ids of chunks and rows are set before writing; the rest is replaced
 in the written file, and the footer's checksum computed again.
 
-Sources: ``re_log_encoding`` and ``rerun/log_msg/v1alpha1`` of rerun-sdk 0.41; Collet, "xxHash fast
-digest algorithm", 2023 (XXH32); Google, "Protocol Buffers: Encoding".
+Sources: ``re_log_encoding`` and ``rerun/log_msg/v1alpha1`` of rerun-sdk 0.41; Google, "Protocol
+Buffers: Encoding".
 """
 
 import struct
@@ -78,20 +78,22 @@ def _set_first_id(file: BinaryIO, path: Path) -> None:
 
 def _sort_footer(file: BinaryIO, path: Path) -> None:
     """Put the columns of the footer's schema in the order of their names."""
+    from xxhash import xxh32_intdigest
+
     file.seek(-_TAIL.size, 2)
     place, size, checksum, magic, count = _TAIL.unpack(file.read())
     if magic != _FOOTER_MAGIC or count != 1:
         raise _unknown(path)
     file.seek(place)
     footer = file.read(size)
-    if xxh32(footer, _CHECKSUM_SEED) != checksum:
+    if xxh32_intdigest(footer, _CHECKSUM_SEED) != checksum:
         raise _unknown(path)
     # Footer: manifests as field 1; manifest: its schema as field 2; schema: Arrow IPC as field 1.
     sorted_ = _replace(footer, (1, 2, 1), _sorted_schema)
     file.seek(place - _MESSAGE.size)
     file.truncate()
     file.write(_MESSAGE.pack(0, len(sorted_)) + sorted_)
-    checksum = xxh32(sorted_, _CHECKSUM_SEED)
+    checksum = xxh32_intdigest(sorted_, _CHECKSUM_SEED)
     file.write(_TAIL.pack(place, len(sorted_), checksum, _FOOTER_MAGIC, count))
 
 
@@ -154,40 +156,6 @@ def _varint(value: int) -> bytes:
         parts.append(value & 0x7F | 0x80)
         value >>= 7
     return bytes([*parts, value])
-
-
-_PRIMES = (2654435761, 2246822519, 3266489917, 668265263, 374761393)
-_MASK = 0xFFFFFFFF
-
-
-def xxh32(data: bytes, seed: int = 0) -> int:
-    """Digest of 32 bits."""
-    p1, p2, p3, p4, p5 = _PRIMES
-    blocks = len(data) // 16
-    if blocks:
-        lanes = [(seed + v) & _MASK for v in (p1 + p2, p2, 0, -p1)]
-        for words in struct.iter_unpack("<4I", data[: 16 * blocks]):
-            lanes = [
-                _rotate((lane + word * p2) & _MASK, 13) * p1 & _MASK
-                for lane, word in zip(lanes, words, strict=True)
-            ]
-        value = sum(map(_rotate, lanes, (1, 7, 12, 18)))
-    else:
-        value = seed + p5
-    value = (value + len(data)) & _MASK
-    rest = data[16 * blocks :]
-    end = len(rest) // 4 * 4
-    for (word,) in struct.iter_unpack("<I", rest[:end]):
-        value = _rotate((value + word * p3) & _MASK, 17) * p4 & _MASK
-    for byte in rest[end:]:
-        value = _rotate((value + byte * p5) & _MASK, 11) * p1 & _MASK
-    for shift, prime in ((15, p2), (13, p3), (16, 1)):
-        value = (value ^ value >> shift) * prime & _MASK
-    return value
-
-
-def _rotate(value: int, bits: int) -> int:
-    return (value << bits | value >> 32 - bits) & _MASK
 
 
 def _unknown(path: Path) -> StorageError:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural import surface_shapes as shapes
 from gen_data.content.procedural.food_shapes import (
     food_material,
@@ -68,21 +68,6 @@ def donut(seed: int) -> Solid:
 def hot_dog(seed: int) -> Solid:
     """A sausage in a long roll. Slots: crust, crumb, sausage, sauce."""
     return _solid(_hot_dog(seed, variant_rng("hot_dog", seed)))
-
-
-def sandwich_facts(seed: int) -> Facts:
-    """The kind."""
-    return Facts(_kind(SANDWICHES, seed))
-
-
-def pizza_facts(seed: int) -> Facts:
-    """The kind."""
-    return Facts(_kind(PIZZAS, seed))
-
-
-def cake_facts(seed: int) -> Facts:
-    """The kind."""
-    return Facts(_kind(CAKES, seed))
 
 
 def _kind(kinds: Mapping[str, object], seed: int) -> str:

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural import patches, surface_shapes
 from gen_data.content.procedural.material_presets import painted_material, patterned_material
@@ -120,12 +120,6 @@ def power_pylon(seed: int, span_m: float) -> Solid:
     )
     hull = hulls.frustum((foot, 0.0), (0.5, high), 4)
     return basic_shapes.make_solid([*parts, *cables], materials, [hull], body=parts)
-
-
-def power_pylon_facts(seed: int, span_m: float) -> Facts:
-    """Its kind, whatever the span."""
-    del span_m
-    return Facts("power_pylon", {"kind": variant_rng("power_pylon", seed).turn(PYLONS, "kind")})
 
 
 def _widths(high_m: float, foot_m: float) -> patches.Array:

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import (
     painted_material,
@@ -67,11 +67,6 @@ def petrol_shop(rng: VariantRng) -> Solid:
     return make_solid(parts, materials, [hulls.box((-x, -half, 0.0), (x, half, high))])
 
 
-def petrol_shop_facts(seed: int) -> Facts:
-    """The colours of its brand."""
-    return Facts("petrol_shop", {"brand": in_turn(BRANDS, seed)})
-
-
 def price_sign(rng: VariantRng) -> Solid:
     """The pylon sign of a petrol station: an emblem over rows of prices, readable from +X and -X.
 
@@ -111,11 +106,6 @@ def price_sign(rng: VariantRng) -> Solid:
     )
     hull = hulls.box((-thick, -half, 0.0), (thick, half, high))
     return make_solid(parts, materials, [hull])
-
-
-def price_sign_facts(seed: int) -> Facts:
-    """The colours of its brand."""
-    return Facts("price_sign", {"brand": in_turn(BRANDS, seed)})
 
 
 def fountain(rng: VariantRng) -> Solid:

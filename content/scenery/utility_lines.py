@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import (
     painted_material,
@@ -79,12 +79,6 @@ def utility_pole(seed: int, span_m: float) -> Solid:
     )
     hull = hulls.frustum((radii[0], 0.0), (radii[1], high), 12)
     return make_solid([*body, *cables], materials, [hull], body=body)
-
-
-def utility_pole_facts(seed: int, span_m: float) -> Facts:
-    """Its kind, whatever the span."""
-    del span_m
-    return Facts("utility_pole", {"kind": variant_rng("utility_pole", seed).turn(POLES, "kind")})
 
 
 def _cross_arms(double: bool, radius: float) -> list[Patch]:

@@ -124,11 +124,6 @@ def road_barrier(rng: VariantRng) -> Solid:
     return make_solid(parts, materials, [hull])
 
 
-def road_barrier_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts(variant_rng("road_barrier", seed).turn(BARRIERS, "kind"))
-
-
 def _safety_shape(plastic: bool, seed: int, rng: VariantRng) -> tuple[list[Patch], np.ndarray]:
     """A New Jersey profile: foot 0.6 m wide (0.41 m plastic), 0.8 m high (EN 1317 systems)."""
     half, wide = (0.6, 0.68) if plastic else (1.0, 1.0)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.procedural.patches import Patch
 from gen_data.content.procedural.surface_shapes import Point2, block
@@ -85,16 +85,6 @@ def food_truck(rng: VariantRng, steer_deg: float) -> Solid:
         ),
     )  # fmt: skip
     return _service_van(design, in_turn(_FOODS, rng.seed), rng.seed, rng, steer_deg, parts)
-
-
-def taxi_facts(**_: object) -> Facts:
-    """Its task."""
-    return Facts("taxi")
-
-
-def police_car_facts(**_: object) -> Facts:
-    """Its task."""
-    return Facts("police")
 
 
 def _service_van(

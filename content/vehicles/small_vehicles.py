@@ -223,11 +223,6 @@ def trailer(rng: VariantRng) -> Solid:
     return make_solid(on_ground(parts), materials, shells)
 
 
-def trailer_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts(variant_rng("trailer", seed).turn(TRAILERS, "kind"))
-
-
 def _paint_wheel(made: Patch) -> Patch:
     """A vehicle's wheel in the slots of a trailer: tyre 3, else 2."""
     tyre = made.slots == 4

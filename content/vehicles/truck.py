@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.procedural.patches import Patch, join_patches
@@ -20,7 +20,7 @@ from gen_data.content.vehicles.vehicle_materials import COLORS, SIDES, Print, ma
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.content.vehicles.wheels import Axles
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.variant_rng import VariantRng
 
 _FLOOR_M = 0.42
 _HALF_M = 1.16
@@ -59,11 +59,6 @@ def truck(rng: VariantRng) -> Solid:
     return assemble_truck(
         (x, cab, roof, top), rng.between(0.42, 0.49, "wheel_radius_m"), load, finish, spoiler
     )
-
-
-def truck_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts(variant_rng("truck", seed).turn(KINDS, "kind"))
 
 
 def fire_engine(rng: VariantRng) -> Solid:

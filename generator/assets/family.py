@@ -204,21 +204,27 @@ class ConstantFacts:
 
 @dataclass(frozen=True)
 class DrawnFacts:
-    """A subcategory, and choices that the variants of a family take in turn.
+    """Choices that the variants of a family take in turn, whatever its other parameters are.
 
     Attributes:
-        options: Options of a choice by the name of its draw.
+        subcategory: A constant, or the options of the choice by the name of its draw.
+        options: Options of attributes by the name of the draw.
     """
 
     family: str
-    subcategory: str
+    subcategory: str | Mapping[str, Lazy]
     options: Mapping[str, Lazy]
 
-    def __call__(self, seed: int) -> Facts:
+    def __call__(self, seed: int, **_: Any) -> Facts:
         """The facts of a variant."""
         rng = variant_rng.variant_rng(self.family, seed)
-        chosen = {name: rng.turn(lazy.value, name) for name, lazy in self.options.items()}
-        return Facts(self.subcategory, chosen)
+
+        def choose(options: Mapping[str, Lazy]) -> dict[str, str]:
+            return {name: rng.turn(tuple(lazy.value), name) for name, lazy in options.items()}
+
+        kind = self.subcategory
+        kind = kind if isinstance(kind, str) else next(iter(choose(kind).values()))
+        return Facts(kind, choose(self.options))
 
 
 @dataclass(frozen=True)
@@ -294,17 +300,17 @@ def _object_family(
     name: str,
     *,
     category: str = "",
-    subcategory: str = "",
+    subcategory: str | Mapping[str, Lazy] = "",
     facts: bool | Mapping[str, Lazy] = False,
     marks: Mapping[int | str, str] | None = None,
     wear: Callable[[Solid, str, int], Solid] | None = None,
     **row: Any,
 ) -> Family:
     known: Callable[..., Facts] | None = None
-    if isinstance(facts, Mapping):
-        known = DrawnFacts(name, subcategory, facts)
-    elif facts:
+    if facts is True:
         known = replace(row["build"], path=f"{row['build'].path}_facts")
+    elif facts or not isinstance(subcategory, str):
+        known = DrawnFacts(name, subcategory, facts or {})
     elif subcategory:
         known = ConstantFacts(subcategory)
     row = {"mass_kg": 0.0, "stackable": False, **row}
@@ -335,7 +341,7 @@ def _arguments(package: str, name: str, row: Mapping[str, Any]) -> dict[str, Any
         **({"wear": _lazy(package, row["wear"])} if "wear" in row else {}),
         "parameters": parameters,
         "declares": {key: _fact(package, value) for key, value in row.get("declares", {}).items()},
-        **({"facts": _facts(package, row["facts"])} if "facts" in row else {}),
+        **{key: _facts(package, row[key]) for key in ("facts", "subcategory") if key in row},
         **_symmetries(package, row.get("symmetries"), dict(fixed)),
     }
 
@@ -345,9 +351,9 @@ def _lazy(package: str, path: str) -> Lazy:
     return Lazy(path if path.startswith("gen_data.") else f"{package}.{path}")
 
 
-def _facts(package: str, given: bool | Mapping[str, str]) -> bool | Mapping[str, Lazy]:
-    """Whether there is a function of facts, or the tables of choices by name of the draw."""
-    if isinstance(given, bool):
+def _facts(package: str, given: bool | str | Mapping[str, str]) -> bool | str | Mapping[str, Lazy]:
+    """Whether there is a function of facts, a subcategory, or the options by name of the draw."""
+    if not isinstance(given, Mapping):
         return given
     return {name: _lazy(package, path) for name, path in given.items()}
 

@@ -16,6 +16,8 @@ from gen_data.cli.tables import print_tables
 from gen_data.core.errors import AssetError, ConfigError, did_you_mean
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from gen_data.assets.checking import Finding
     from gen_data.assets.library import Library
     from gen_data.core.asset_types import Asset
@@ -179,9 +181,7 @@ def pack(folder: Path, out: Path | None, force: bool) -> None:
 @assets.command()
 @click.argument("source", metavar="CONFIG")
 @options.configuration_options
-def prepare(
-    source: str, seed: int | None, overrides: tuple[str, ...], without: tuple[str, ...]
-) -> None:
+def prepare(source: str, **changes: Unpack[options.Changes]) -> None:
     """Make everything that CONFIG can use ahead of its first run, and keep it in the cache.
 
     For images of containers and nodes of clusters, which take the folder of `gen-data cache info`
@@ -203,9 +203,7 @@ def prepare(
         bar.update(task, completed=number, total=total, description=asset_id[:40])
 
     try:
-        count = prepare_assets(
-            source, seed=seed, overrides=overrides, without=without, on_progress=show
-        )
+        count = prepare_assets(source, on_progress=show, **changes)
         bar.update(task, completed=count, description="")
     finally:
         if bar.live.is_started:

@@ -2,9 +2,9 @@
 
 import re
 import shlex
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,30 +39,16 @@ gen-data export out/tabletop --format yolo --format voc --out out/further
 @click.option("--label-map", type=click.Path(path_type=Path), help="YAML file with a label map.")
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
 @click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
-def export(
-    folder: Path,
-    formats: tuple[str, ...],
-    out: Path,
-    label_map: Path | None,
-    workers: int | None,
-    force: bool,
-) -> None:
+def export(folder: Path, formats: tuple[str, ...], out: Path, **keywords: Any) -> None:
     """Export a finished data set."""
     from gen_data.api.export import export as write_exports
-    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.cli.generate_command import print_summary, run_with_progress
     from gen_data.runner.stored import StoredSamples
 
-    with _named_options(formats), progress_bar(StoredSamples(folder).n) as show:
-        summary = write_exports(
-            folder,
-            [_parse_format(text) for text in formats],
-            out,
-            label_map=label_map,
-            workers=workers,
-            force=force,
-            on_progress=show,
-            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
-        )
+    with _named_options(formats):
+        parsed = [_parse_format(text) for text in formats]
+        run = partial(write_exports, folder, parsed, out, **keywords)
+        summary = run_with_progress(StoredSamples(folder).n, run)
     print_summary(summary)
 
 

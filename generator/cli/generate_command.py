@@ -6,8 +6,8 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
-from typing import TYPE_CHECKING
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, Protocol
 
 from gen_data.api.generate import generate
 from gen_data.cli import options, tables
@@ -17,52 +17,40 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from gen_data.runner.progress import RunProgress, Summary
-    from gen_data.runner.ray_cluster import RayCluster
+
+    class Run(Protocol):
+        """A function of the API that makes a data set, with all other arguments bound."""
+
+        def __call__(
+            self, *, on_progress: Callable[[RunProgress], None], resume_command: str
+        ) -> Summary:
+            """Make the data set, or its missing part."""
 
 
-def generate_with_progress(
-    choice: options.ConfigurationOptions,
-    n: int,
-    *,
-    out: str | None,
-    workers: int | None,
-    repair: bool = False,
-    allow_mixed_numerics: bool = False,
-    force: bool = False,
-    skip_failed: bool = False,
-    sample_timeout_s: float | None = None,
-    shards: tuple[int, int] | None = None,
-    cluster: RayCluster | None = None,
-) -> None:
+def generate_with_progress(config: str, n: int, **keywords: Any) -> None:
     """Generate samples 0 to n - 1, or the missing ones, and print a summary.
 
+    Args:
+        config: A path, or a shipped name.
+        n: Number of samples.
+        keywords: By name, the options of a cluster, and other keywords of ``gen_data.generate``.
+
     Raises:
-        GenDataError: see ``gen_data.api.generate``, which has the same arguments.
+        GenDataError: see ``gen_data.generate``.
     """
-    with progress_bar(n) as show:
-        summary = generate(
-            choice.source,
-            n,
-            out=out,
-            workers=workers,
-            seed=choice.seed,
-            overrides=choice.overrides,
-            without=choice.without,
-            repair=repair,
-            allow_mixed_numerics=allow_mixed_numerics,
-            force=force,
-            skip_failed=skip_failed,
-            sample_timeout_s=sample_timeout_s,
-            shards=shards,
-            cluster=cluster,
-            on_progress=show,
-            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
-        )
-    print_summary(summary)
+    chosen = {name: keywords.pop(name) for name in options.CLUSTER}
+    cluster = options.choose_cluster(**chosen)
+    print_summary(run_with_progress(n, partial(generate, config, n, cluster=cluster, **keywords)))
+
+
+def run_with_progress(n: int, run: Run) -> Summary:
+    """Make a data set of ``n`` samples under a progress bar; the same command line resumes it."""
+    with _progress_bar(n) as show:
+        return run(on_progress=show, resume_command=shlex.join(["gen-data", *sys.argv[1:]]))
 
 
 @contextmanager
-def progress_bar(n: int) -> Iterator[Callable[[RunProgress], None]]:
+def _progress_bar(n: int) -> Iterator[Callable[[RunProgress], None]]:
     """Show the progress of a run of ``n`` samples."""
 
     @cache

@@ -15,8 +15,6 @@ import click
 from click.core import ParameterSource
 
 from gen_data.cli.options import (
-    ConfigurationOptions,
-    choose_cluster,
     cluster_options,
     configuration_options,
     parse_shards,
@@ -187,6 +185,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
 )
 @click.option(
     "--sample-timeout",
+    "sample_timeout_s",
     type=float,
     metavar="SECONDS",
     help="A sample that takes longer hangs; no second try [default: 300 s, 3 tries].",
@@ -200,26 +199,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
 @cluster_options
 @configuration_options
 @click.pass_context
-def cli(
-    context: click.Context,
-    config: str | None,
-    n: int | None,
-    out: str | None,
-    seed: int | None,
-    workers: int | None,
-    repair: bool,
-    allow_mixed_numerics: bool,
-    force: bool,
-    skip_failed: bool,
-    sample_timeout: float | None,
-    shards: tuple[int, int] | None,
-    runner: str,
-    address: str | None,
-    cpus: float | None,
-    gpus: float | None,
-    overrides: tuple[str, ...],
-    without: tuple[str, ...],
-) -> None:
+def cli(context: click.Context, /, config: str | None, n: int | None, **keywords: Any) -> None:
     """Generate a data set, unless a command follows."""
     given = _given_options(context)
     if context.invoked_subcommand is not None:
@@ -245,20 +225,7 @@ def cli(
         raise errors.ConfigError("--n is missing: how many samples?")
     from gen_data.cli.generate_command import generate_with_progress
 
-    choice = ConfigurationOptions(config, seed, overrides, without)
-    generate_with_progress(
-        choice,
-        n,
-        out=out,
-        workers=workers,
-        repair=repair,
-        allow_mixed_numerics=allow_mixed_numerics,
-        force=force,
-        skip_failed=skip_failed,
-        sample_timeout_s=sample_timeout,
-        shards=shards,
-        cluster=choose_cluster(runner, address, cpus, gpus),
-    )
+    generate_with_progress(config, n, **keywords)
 
 
 def _given_options(context: click.Context) -> list[str]:

@@ -1,8 +1,8 @@
 """The command ``merge``."""
 
-import shlex
-import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -18,9 +18,7 @@ import click
     is_flag=True,
     help="Accept parts of machines whose computations differ in the last bits.",
 )
-def merge(
-    parts: tuple[Path, ...], out: Path, workers: int | None, allow_mixed_numerics: bool
-) -> None:
+def merge(parts: tuple[Path, ...], out: Path, **keywords: Any) -> None:
     r"""Join PARTS, folders that were generated with --shards, into one data set.
 
     \b
@@ -31,16 +29,7 @@ def merge(
     The result has the same bytes as one run. Shards that no part has are generated; parts stay.
     """
     from gen_data.api.merge import merge as join
-    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.cli.generate_command import print_summary, run_with_progress
     from gen_data.runner.merge import common_plan
 
-    with progress_bar(common_plan(parts).n) as show:
-        summary = join(
-            parts,
-            out,
-            workers=workers,
-            allow_mixed_numerics=allow_mixed_numerics,
-            on_progress=show,
-            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
-        )
-    print_summary(summary)
+    print_summary(run_with_progress(common_plan(parts).n, partial(join, parts, out, **keywords)))

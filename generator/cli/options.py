@@ -1,42 +1,33 @@
-"""Options of all commands with a configuration."""
+"""Options that several commands share."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
 
 import click
 
 from gen_data.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from gen_data.assemble.config import Config
     from gen_data.runner.ray_cluster import RayCluster
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-@dataclass(frozen=True)
-class ConfigurationOptions:
-    """A configuration and its changes on the command line.
+CLUSTER = ("runner", "address", "cpus", "gpus")
+"""Parameters of ``cluster_options``."""
+
+
+class Changes(TypedDict):
+    """Parameters of ``configuration_options``; functions of the API have the same.
 
     Attributes:
-        source: A path, a shipped name, or the folder of a data set.
         overrides: ``KEY=VALUE`` texts.
         without: Names of randomizers to leave out.
     """
 
-    source: str
     seed: int | None
     overrides: tuple[str, ...]
     without: tuple[str, ...]
-
-    def config(self) -> "Config":
-        """Load and validate the configuration."""
-        from gen_data.assemble.config import load_config
-
-        return load_config(
-            self.source, seed=self.seed, overrides=self.overrides, without=self.without
-        )
 
 
 def parse_shards(

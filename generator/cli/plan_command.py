@@ -13,6 +13,8 @@ from gen_data.core.system_calls import usable_cores
 from gen_data.exporters.label_map import category_of
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from gen_data.assemble.config import Config
     from gen_data.assemble.pipeline_factory import PipelineFactory
     from gen_data.runner.progress import RunProgress
@@ -35,9 +37,7 @@ def plan(
     price_per_cpu_hour: float | None,
     price_per_gpu_hour: float | None,
     price_per_gb_month: float | None,
-    seed: int | None,
-    overrides: tuple[str, ...],
-    without: tuple[str, ...],
+    **changes: "Unpack[options.Changes]",
 ) -> None:
     """Print shards, size, categories and exports of a data set, without rendering it.
 
@@ -50,11 +50,14 @@ def plan(
         raise ConfigError("--price-per-...: needs measured hours; expected --probe K with it")
     from rich.console import Console
 
-    choice = options.ConfigurationOptions(source, seed, overrides, without)
-    config = choice.config()
+    from gen_data.assemble.config import load_config
+
+    config = load_config(source, **changes)
     facts = list(plan_rows(config, n))
     if probe is not None:
-        facts += cost_estimate.estimate_rows(_measure(choice, probe), n, usable_cores(), prices)
+        facts += cost_estimate.estimate_rows(
+            _measure(source, changes, probe), n, usable_cores(), prices
+        )
     tables.print_facts(Console(), f"{config.name}: {n} samples", facts)
 
 
@@ -116,7 +119,7 @@ def _product(scenes: int, views: int, steps: int) -> str:
     return " x ".join(f"{count:,} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
 
 
-def _measure(choice: options.ConfigurationOptions, count: int) -> cost_estimate.Probe:
+def _measure(source: str, changes: options.Changes, count: int) -> cost_estimate.Probe:
     """Generate ``count`` samples in a temporary folder, in this process."""
     from gen_data.api.generate import generate
     from gen_data.core.temporary_folders import temporary_folder
@@ -132,13 +135,13 @@ def _measure(choice: options.ConfigurationOptions, count: int) -> cost_estimate.
     with temporary_folder("plan") as folder:
         try:
             summary = generate(
-                choice.source,
+                source,
                 count,
                 out=folder / "probe",
                 workers=0,
-                seed=choice.seed,
-                overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
-                without=choice.without,
+                seed=changes["seed"],
+                overrides=(*changes["overrides"], "splits={train: 1, val: 0, test: 0}"),
+                without=changes["without"],
                 on_progress=note,
             )
         except NoLabels as error:

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.cli.options import ConfigurationOptions, configuration_options
+from gen_data.cli import options
 from gen_data.core import capture, optional_packages, sample
 from gen_data.core.errors import ConfigError
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from gen_data.preview.overlay import Image
     from gen_data.preview.sensor_views import PointColors
 
@@ -38,7 +40,7 @@ WRITTEN = "written"
     show_default=True,
     help="With --web: the address to listen on; 0.0.0.0 shows the scene to the whole network.",
 )
-@configuration_options
+@options.configuration_options
 def preview(
     source: str,
     n: int,
@@ -47,15 +49,14 @@ def preview(
     points: "PointColors",
     web: bool,
     host: str,
-    seed: int | None,
-    overrides: tuple[str, ...],
-    without: tuple[str, ...],
+    **changes: "Unpack[options.Changes]",
 ) -> None:
     """Show samples in Rerun: 3D scene, images, scans, boxes; sequences have a timeline [s].
 
     SOURCE is a configuration (a path or a shipped name), or the folder of a data set, whose
     samples are generated again from its plan.
     """
+    from gen_data.assemble.config import load_config
     from gen_data.assemble.pipeline_factory import open_pipeline
 
     missing = optional_packages.missing_packages("rerun")
@@ -64,7 +65,7 @@ def preview(
     from gen_data.preview.rerun_recording import save_recording, send_samples
     from gen_data.preview.viewer import open_window, serve_web
 
-    config = ConfigurationOptions(source, seed, overrides, without).config()
+    config = load_config(source, **changes)
     with open_pipeline(config) as pipeline:
         samples = _samples(pipeline.sample, first, n)
         info = pipeline.info
@@ -104,7 +105,7 @@ def preview(
 )
 @click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")
 @click.option("--captions", is_flag=True, help="Write a caption under every tile.")
-@configuration_options
+@options.configuration_options
 def contact_sheet(
     sources: tuple[str, ...],
     n: int,
@@ -116,15 +117,14 @@ def contact_sheet(
     channels: str,
     labels: bool,
     captions: bool,
-    seed: int | None,
-    overrides: tuple[str, ...],
-    without: tuple[str, ...],
+    **changes: "Unpack[options.Changes]",
 ) -> None:
     """Draw samples with their labels on one PNG.
 
     SOURCES are configurations (paths or shipped names) or folders of data sets, in the order of
     the tiles.
     """
+    from gen_data.assemble.config import load_config
     from gen_data.assemble.pipeline_factory import open_pipeline
     from gen_data.preview.contact_sheet import arrange_tiles, make_tiles, render_tiles, write_sheet
 
@@ -132,7 +132,7 @@ def contact_sheet(
     wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))
     images: list[Image] = []
     for source in sources:
-        config = ConfigurationOptions(source, seed, overrides, without).config()
+        config = load_config(source, **changes)
         with open_pipeline(config, extra_channels=frozenset(wanted)) as pipeline:
             samples = _samples(pipeline.sample, first, n, step)
             info = pipeline.info

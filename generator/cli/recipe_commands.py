@@ -1,17 +1,17 @@
 """Commands ``recipe`` and ``pull``: a data set as a few kilobytes, and made from them."""
 
-import shlex
-import sys
+from __future__ import annotations
+
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gen_data.cli.options import (
-    choose_cluster,
-    cluster_options,
-    configuration_options,
-    parse_shards,
-)
+from gen_data.cli import options
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 RECIPE_HELP = """Print the recipe of a data set, from which `gen-data pull` makes it again.
 
@@ -50,21 +50,19 @@ assets, 5 versions or other bytes, 7 other labels or images.
     type=click.Path(path_type=Path),
     help="File of `gen-data assets pack`, named by its digest.",
 )
-@configuration_options
+@options.configuration_options
 def recipe(
     source: str,
     n: int | None,
     lock: Path | None,
     packs: tuple[Path, ...],
-    seed: int | None,
-    overrides: tuple[str, ...],
-    without: tuple[str, ...],
+    **changes: Unpack[options.Changes],
 ) -> None:
     """Print the recipe of a data set."""
     from gen_data.api.recipes import recipe as make_recipe
     from gen_data.api.recipes import requirements
 
-    text = make_recipe(source, n, seed=seed, overrides=overrides, without=without, packs=packs)
+    text = make_recipe(source, n, packs=packs, **changes)
     if lock is not None:
         from gen_data.runner.durable_files import storage_errors
 
@@ -80,7 +78,10 @@ def recipe(
 )
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
 @click.option(
-    "--shards", callback=parse_shards, metavar="A:B", help="Make shards A to B - 1 only; see merge."
+    "--shards",
+    callback=options.parse_shards,
+    metavar="A:B",
+    help="Make shards A to B - 1 only; see merge.",
 )
 @click.option("--semantic", is_flag=True, help="Accept other versions; compare labels only.")
 @click.option(
@@ -90,39 +91,17 @@ def recipe(
     help="The author's data set: names a difference; with --semantic, compares images.",
 )
 @click.option("--trust", is_flag=True, help="Read asset folders outside of the recipe's folder.")
-@cluster_options
-def pull(
-    path: Path,
-    out: str | None,
-    workers: int | None,
-    shards: tuple[int, int] | None,
-    semantic: bool,
-    against: Path | None,
-    trust: bool,
-    runner: str,
-    address: str | None,
-    cpus: float | None,
-    gpus: float | None,
-) -> None:
+@options.cluster_options
+def pull(path: Path, semantic: bool, against: Path | None, **keywords: Any) -> None:
     """Make the data set of a recipe."""
     from gen_data.api.recipes import pull as make_again
-    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.cli.generate_command import print_summary, run_with_progress
     from gen_data.runner.recipe import read_recipe
 
     file = read_recipe(path)
-    with progress_bar(file.recipe.n) as show:
-        summary = make_again(
-            file,
-            out=out,
-            workers=workers,
-            shards=shards,
-            cluster=choose_cluster(runner, address, cpus, gpus),
-            semantic=semantic,
-            against=against,
-            trust=trust,
-            on_progress=show,
-            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
-        )
+    cluster = options.choose_cluster(**{name: keywords.pop(name) for name in options.CLUSTER})
+    run = partial(make_again, file, cluster=cluster, semantic=semantic, against=against, **keywords)
+    summary = run_with_progress(file.recipe.n, run)
     proof = file.recipe.proof(semantic)
     which = (
         f"{summary.shards_left} shards left; the others" if summary.shards_left else "all shards"

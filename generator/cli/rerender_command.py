@@ -1,8 +1,8 @@
 """``gen-data rerender``: the scenes of a finished data set, rendered again."""
 
-import shlex
-import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -41,30 +41,13 @@ gen-data rerender out/tabletop --out out/traced --tier pathtraced
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
 @click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
 def rerender(
-    folder: Path,
-    out: Path,
-    sensors: Path | None,
-    tier: str | None,
-    overrides: tuple[str, ...],
-    redraw: tuple[str, ...],
-    workers: int | None,
-    force: bool,
+    folder: Path, out: Path, tier: str | None, overrides: tuple[str, ...], **keywords: Any
 ) -> None:
     """Render a finished data set again."""
     from gen_data.api.rerender import rerender as render_again
-    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.cli.generate_command import print_summary, run_with_progress
     from gen_data.runner.stored import StoredSamples
 
-    with progress_bar(StoredSamples(folder).n) as show:
-        summary = render_again(
-            folder,
-            out,
-            sensors=sensors,
-            overrides=(*overrides, *([f"render.tier={tier}"] if tier else [])),
-            redraw=redraw,
-            workers=workers,
-            force=force,
-            on_progress=show,
-            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
-        )
-    print_summary(summary)
+    changes = (*overrides, *([f"render.tier={tier}"] if tier else []))
+    run = partial(render_again, folder, out, overrides=changes, **keywords)
+    print_summary(run_with_progress(StoredSamples(folder).n, run))

@@ -1,10 +1,16 @@
 """``gen-data sample``: one sample on disk."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.cli.options import configuration_options
+from gen_data.cli import options
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 @click.command("sample")
@@ -13,20 +19,13 @@ from gen_data.cli.options import configuration_options
 @click.option(
     "--out", "-o", required=True, type=click.Path(path_type=Path), help="New or empty folder."
 )
-@configuration_options
-def sample(
-    source: str,
-    index: int,
-    out: Path,
-    seed: int | None,
-    overrides: tuple[str, ...],
-    without: tuple[str, ...],
-) -> None:
+@options.configuration_options
+def sample(source: str, index: int, out: Path, **changes: Unpack[options.Changes]) -> None:
     """Write one sample of a configuration or of a data set, in all of its formats.
 
     Its files have the same bytes as in the whole data set.
     """
     from gen_data.api.write_sample import write_sample
 
-    folder = write_sample(source, index, out, seed=seed, overrides=overrides, without=without)
+    folder = write_sample(source, index, out, **changes)
     click.echo(f"{folder}: sample {index}")

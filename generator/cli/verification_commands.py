@@ -1,9 +1,8 @@
 """Commands that check and restore data sets: ``verify``, ``repair``, ``diff``, ``repro``."""
 
 import json
-import shlex
-import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -176,7 +175,7 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
     Damaged and foreign files are moved to FOLDER/run/quarantine.
     """
     from gen_data.api.repair import repair as restore
-    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.cli.generate_command import print_summary, run_with_progress
     from gen_data.runner.layout import PLAN_NAME
     from gen_data.runner.plan import load_plan
 
@@ -185,15 +184,8 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
         n = load_plan(folder).n if (folder / PLAN_NAME).is_file() else 0
     except GenDataError:
         n = 0
-    with progress_bar(n) as show:
-        summary = restore(
-            folder,
-            source=source,
-            workers=workers,
-            on_progress=show,
-            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
-        )
-    print_summary(summary)
+    run = partial(restore, folder, source=source, workers=workers)
+    print_summary(run_with_progress(n, run))
 
 
 @click.command()

@@ -19,6 +19,7 @@ EXTRAS = {
     "pybullet": ("pybullet", "bullet"),
     "rerun": ("rerun-sdk", "preview"),
     "shapely": ("shapely", "formats"),
+    "xxhash": ("xxhash", "preview"),
 }
 """Package and extra by the module that the package installs."""
 

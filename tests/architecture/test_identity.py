@@ -33,6 +33,7 @@ BYTES_DO_NOT_DEPEND_ON = {
     "threadpoolctl": "limits BLAS to one thread, as workers do",
     "typing_extensions": "helps type checkers",
     "webdataset": "reads exports for certificates",
+    "xxhash": "computes a digest that is the same in all releases",
     "yaml": "reads text; the configuration that it gives is part of the plan",
 }
 """Imported libraries that are not part of the identity, and why."""

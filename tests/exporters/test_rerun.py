@@ -14,7 +14,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.errors import StorageError
 from gen_data.core.interfaces import media_path
 from gen_data.exporters.rerun import Rerun
-from gen_data.exporters.rrd_container import write_recording, xxh32
+from gen_data.exporters.rrd_container import write_recording
 from tests.exporters.datasets import street_in
 
 CLI = (sys.executable, "-c", "import sys; from rerun_cli.__main__ import main; sys.exit(main())")
@@ -164,16 +164,6 @@ def test_processes_write_the_same_bytes(dataset: Path, tmp_path: Path) -> None:
     for file in files:
         subprocess.run([sys.executable, "-c", _SCRIPT, file], check=True)
     assert len({file.read_bytes() for file in files}) == 1
-
-
-@pytest.mark.parametrize(
-    ("data", "seed", "digest"),
-    [(b"", 0, 0x02CC5D05), (b"a", 0, 0x550D7456),
-     (b"Nobody inspects the spammish repetition", 0, 0xE2293B2F)],
-)  # fmt: skip
-def test_digests_are_those_of_xxhash(data: bytes, seed: int, digest: int) -> None:
-    """Published values of XXH32."""
-    assert xxh32(data, seed) == digest
 
 
 def test_an_unknown_container_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
