@@ -313,10 +313,14 @@ class Library:
 
         Arrays of assets that are not stored on disk are not stored: their number is unlimited.
         """
-        owner = asset_id.partition("#")[0]
-        if self._is_generated(owner) and not self._generated.is_stored(parse_asset_id(owner)):
+        if not self.is_stored(asset_id):
             return compute()
         return self._disk.arrays(self._derived_key(asset_id, name), compute)
+
+    def is_stored(self, asset_id: str) -> bool:
+        """Whether arrays of that asset are stored on disk."""
+        owner = asset_id.partition("#")[0]
+        return not self._is_generated(owner) or self._generated.is_stored(parse_asset_id(owner))
 
     def _derived_key(self, asset_id: str, name: str) -> str:
         owner = asset_id.partition("#")[0]

@@ -192,6 +192,10 @@ class DerivedArrays(Protocol):
         """
         ...
 
+    def is_stored(self, asset_id: str) -> bool:
+        """Whether arrays of that asset are stored; those of others are computed in each process."""
+        ...
+
 
 @runtime_checkable
 class WrittenAssets(Protocol):

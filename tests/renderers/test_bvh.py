@@ -62,8 +62,8 @@ def trace_world(
     )
 
 
-def tree_of(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    return mesh_tree(vertices, faces, *face_boxes(vertices, faces))
+def tree_of(vertices: np.ndarray, faces: np.ndarray, *, quick: bool = False) -> np.ndarray:
+    return mesh_tree(vertices, faces, *face_boxes(vertices, faces), quick=quick)
 
 
 def traced(
@@ -176,11 +176,12 @@ MESHES = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("quick", [False, True])
 @pytest.mark.parametrize("name", MESHES)
-def test_a_tree_holds_every_face_once_in_boxes_around_it(name: str) -> None:
+def test_a_tree_holds_every_face_once_in_boxes_around_it(name: str, quick: bool) -> None:
     vertices, faces = MESHES[name]
 
-    found, waiting = walked(tree_of(vertices, faces), leaf_groups=10)
+    found, waiting = walked(tree_of(vertices, faces, quick=quick), leaf_groups=10)
 
     assert sorted(found) == list(range(len(faces)))
     assert waiting <= STACK
@@ -202,15 +203,16 @@ def test_the_same_mesh_gives_the_same_tree() -> None:
     assert tree_of(vertices, faces).tobytes() == tree_of(vertices, faces).tobytes()
 
 
+@pytest.mark.parametrize("quick", [False, True])
 @pytest.mark.parametrize("name", MESHES)
-def test_rays_meet_the_face_that_testing_every_face_finds(name: str) -> None:
+def test_rays_meet_the_face_that_testing_every_face_finds(name: str, quick: bool) -> None:
     vertices, faces = MESHES[name]
     origins, ways = rays(11, 3000)
     # Some that surely hit something.
     aims = vertices[faces].mean(axis=1)[np.arange(1000) % len(faces)]
     ways[:1000] = aims - origins[:1000]
 
-    t, weights, face, blocked = traced(tree_of(vertices, faces), origins, ways)
+    t, weights, face, blocked = traced(tree_of(vertices, faces, quick=quick), origins, ways)
     expected, clear = by_every_face(vertices[faces], origins, ways)
 
     hit = face >= 0

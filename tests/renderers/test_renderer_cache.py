@@ -113,6 +113,9 @@ class StoringLibrary(FakeLibrary):
             self.stored[asset_id, name] = arrays
         return self.stored[asset_id, name]
 
+    def is_stored(self, asset_id: str) -> bool:
+        return asset_id in self.meshes
+
 
 def test_stored_hierarchies_and_mip_levels_give_the_same_image() -> None:
     """Computed, stored, or loaded by another renderer."""

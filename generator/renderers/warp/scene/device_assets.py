@@ -69,8 +69,12 @@ class DeviceMesh:
     nbytes: int
 
 
-def prepare_mesh(data: MeshData) -> Arrays:
+def prepare_mesh(data: MeshData, *, quick: bool = False) -> Arrays:
     """Compute what rendering a mesh takes beside its own arrays.
+
+    Args:
+        data: The mesh.
+        quick: Whether its ``tree`` is a quick one.
 
     Returns:
         ``boxes`` of ``boxes_around`` as by ``group_boxes``; ``convex`` [1], 0 or 1; the ``tree`` of
@@ -82,7 +86,7 @@ def prepare_mesh(data: MeshData) -> Arrays:
     return {
         "boxes": group_boxes(lows, highs),
         "convex": np.array([is_convex]),
-        "tree": mesh_tree(data.vertices_m, data.faces, face_lows, face_highs),
+        "tree": mesh_tree(data.vertices_m, data.faces, face_lows, face_highs, quick=quick),
     }
 
 

@@ -108,8 +108,11 @@ class DeviceCache:
             # The sizes, too: a tree of another mesh would lead rays out of its arrays, if somebody
             # changed a family and not its version.
             sizes = f"{len(data.vertices_m)} {len(data.faces)}"
+            lasts = self._store is None or self._store.is_stored(asset_id)
             prepared = self._derived(
-                asset_id, f"device mesh {sizes}", lambda: device_assets.prepare_mesh(data)
+                asset_id,
+                f"device mesh {sizes}",
+                lambda: device_assets.prepare_mesh(data, quick=not lasts),
             )
             return device_assets.upload_mesh(data, prepared, self.device)
 

@@ -19,6 +19,7 @@ NOWHERE = 1.0e30
 def grow(
     boxes: wp.array2d[wp.float32],
     leaf: int,
+    quick: int,
     nodes: wp.array3d[wp.float32],
     codes: wp.array2d[wp.int32],
     leaves: wp.array[wp.vec2i],
@@ -32,6 +33,7 @@ def grow(
 def grow_tree(
     boxes: wp.array2d[float],
     leaf: int,
+    quick: int,
     nodes: wp.array3d[float],
     codes: wp.array2d[int],
     leaves: wp.array[wp.vec2i],
@@ -43,9 +45,45 @@ def grow_tree(
         boxes: Low corner, number, minus high corner, 0 [n, 8]; permuted: those of a node are
             contiguous.
         leaf: Maximum number of boxes in a leaf.
+        quick: 1 to cut parts in the middle of their longest side; 0 by the surface area heuristic.
         nodes: Bounds: low x, high x, low y, ... [., 6, 8]; no ray enters unused lanes.
         codes: Child of each lane: the number of a node, or -1 - number of a leaf [., 8].
         leaves: (begin, end) into ``boxes``.
         counts: (nodes, leaves).
     """
-    grow(boxes, leaf, nodes, codes, leaves, counts)
+    grow(boxes, leaf, quick, nodes, codes, leaves, counts)
+
+
+@wp.kernel
+def fill_leaves(
+    boxes: wp.array2d[float],
+    leaves: wp.array[wp.vec2i],
+    vertices_m: wp.array[wp.vec3],
+    faces: wp.array2d[int],
+    corners_m: wp.array3d[float],
+    numbers: wp.array3d[int],
+):
+    """Copy the triangles of a mesh into the leaves of its tree; a thread per leaf, on the CPU.
+
+    Args:
+        boxes: As ``grow_tree`` leaves them.
+        leaves: As ``grow_tree`` leaves them.
+        vertices_m: Of the mesh.
+        faces: Of the mesh [n, 3].
+        corners_m: Groups of leaves [., 10, 8]: x of first, second and third corners, y, z; 0 in
+            lanes without a face.
+        numbers: The same memory as integers; the last group of each leaf is filled with the numbers
+            of faces, -1 in lanes without one.
+    """
+    leaf = wp.tid()
+    first = leaves[leaf][0]
+    count = leaves[leaf][1] - first
+    for lane in range(8):
+        numbers[leaf, 9, lane] = -1
+        if lane < count:
+            face = int(boxes[first + lane, 3])
+            numbers[leaf, 9, lane] = face
+            for k in range(3):
+                corner = vertices_m[faces[face, k]]
+                for axis in range(3):
+                    corners_m[leaf, 3 * axis + k, lane] = corner[axis]

@@ -48,20 +48,22 @@ auto halve = [&](const Part& part, Part& left, Part& right) {
     left = part_of(part.begin, middle);
     right = part_of(middle, part.end);
 };
-// Cut a part in two by the best split.
-auto cut = [&](const Part& part, Part& left, Part& right) {
-    const int begin = part.begin, end = part.end;
+// The axis and the bin at which the best split begins its right part; no axis if all centres coincide.
+struct Split { int axis, at; };
+// In the middle of the longest axis.
+auto middle_split = [&](const Part& part) -> Split {
+    const Floats size = part.high - part.low;
+    const int level = size[1] > size[0] ? 1 : 0, axis = size[2] > size[level] ? 2 : level;
+    return {size[axis] > 0.0f ? axis : -1, BINS / 2};
+};
+auto best_split = [&](const Part& part, Floats scale) -> Split {
     const Floats low = part.low, high = part.high;
-    Floats scale = 0.0f;
-    for (int axis = 0; axis < 3; ++axis)
-        if (high[axis] > low[axis])
-            scale[axis] = (float)BINS / (high[axis] - low[axis]);
     Floats bins[3][BINS];
     int counts[3][BINS] = {};
     for (auto& of_axis : bins)
         for (auto& bin : of_axis)
             bin = FARTHEST;
-    for (int i = begin; i < end; ++i) {
+    for (int i = part.begin; i < part.end; ++i) {
         const Floats box = box_at(i), steps = (doubled_centre(box) - low) * scale;
         for (int axis = 0; axis < 3; ++axis) {
             const int k = bin_of(steps[axis]);
@@ -75,7 +77,7 @@ auto cut = [&](const Part& part, Part& left, Part& right) {
         return half_area(bounds) * (float)((count + leaf - 1) / leaf);
     };
     float best = FARTHEST;
-    int best_axis = -1, split_at = 0;
+    Split split = {-1, 0};
     for (int axis = 0; axis < 3; ++axis) {
         if (!(high[axis] > low[axis]))
             continue;
@@ -98,21 +100,31 @@ auto cut = [&](const Part& part, Part& left, Part& right) {
             const float cost = beyond[k] + cost_of(bounds, count);
             if (cost < best) {
                 best = cost;
-                best_axis = axis;
-                split_at = k;
+                split = {axis, k};
             }
         }
     }
+    return split;
+};
+// Cut a part in two.
+auto cut = [&](const Part& part, Part& left, Part& right) {
+    const int begin = part.begin, end = part.end;
+    const Floats low = part.low, high = part.high;
+    Floats scale = 0.0f;
+    for (int axis = 0; axis < 3; ++axis)
+        if (high[axis] > low[axis])
+            scale[axis] = (float)BINS / (high[axis] - low[axis]);
+    const Split split = quick ? middle_split(part) : best_split(part, scale);
     left = {begin, begin, FARTHEST, FARTHEST, -FARTHEST};
     right = {end, end, FARTHEST, FARTHEST, -FARTHEST};
     // All centres coincide: any split is as good, and the median keeps the depth logarithmic.
-    if (best_axis < 0)
+    if (split.axis < 0)
         return halve(part, left, right);
     // In place, as in quicksort.
     while (left.end < right.begin) {
         const Floats box = box_at(left.end);
-        const float centre = doubled_centre(box)[best_axis];
-        if (bin_of((centre - low[best_axis]) * scale[best_axis]) < split_at) {
+        const float centre = doubled_centre(box)[split.axis];
+        if (bin_of((centre - low[split.axis]) * scale[split.axis]) < split.at) {
             add(left, box);
             ++left.end;
         } else {
