@@ -23,10 +23,9 @@ _PATH_M, _SLAB_M = (0.5, 60.0), 0.06
 _JOINT_M = 0.06
 """Grass between the slabs of a path."""
 
-_LANDING_M, _TREAD_M, _BEHIND_M = 1.1, 0.29, 0.05
-"""A landing reaches beyond the steps that some houses have themselves."""
-_STONES = ((0.36, 0.35, 0.33), (0.27, 0.26, 0.26), (0.42, 0.38, 0.32), (0.33, 0.25, 0.21))
-"""Concrete, granite, sandstone, brick; linear RGB, assumed."""
+_TREAD_M, _BEHIND_M = 0.29, 0.05
+STONES = ((0.36, 0.35, 0.33), (0.27, 0.26, 0.26), (0.42, 0.38, 0.32), (0.33, 0.25, 0.21))
+"""Concrete, granite, sandstone, brick of stairs and ramps; linear RGB, assumed."""
 
 
 def terrace(rng: VariantRng) -> Solid:
@@ -89,7 +88,7 @@ def garden_path(seed: int, length_m: float) -> Solid:
     return Solid(mesh, ConvexParts((np.round(hulls.box((-x, -half, 0.0), (x, half, _SLAB_M)), 6),)))
 
 
-def door_stairs(seed: int, rise_m: float, width_m: float) -> Solid:
+def door_stairs(seed: int, rise_m: float, width_m: float, landing_m: float) -> Solid:
     """Stairs from a landing before a door down to the ground, along +X; the door is at x = 0.
 
     The landing begins 5 cm behind the wall.
@@ -100,24 +99,28 @@ def door_stairs(seed: int, rise_m: float, width_m: float) -> Solid:
         seed: Of the stone: each of a few in turn.
         rise_m: Height of the landing.
         width_m: Of landing and steps.
+        landing_m: Depth of the landing before the wall; the usual one reaches beyond the steps that
+            some houses have themselves.
 
     Raises:
-        ValueError: the height is not from 0.05 to 5 m, or the width not from 0.5 to 10 m.
+        ValueError: the height is not from 0.05 to 5 m, the width not from 0.5 to 10 m, or the depth
+            not from 0.5 to 5 m.
     """
-    if not (0.05 <= rise_m <= 5.0 and 0.5 <= width_m <= 10.0):
+    if not (0.05 <= rise_m <= 5.0 and 0.5 <= width_m <= 10.0 and 0.5 <= landing_m <= 5.0):
         raise ValueError(
-            f"rise_m is {rise_m:g}, width_m {width_m:g}; expected 0.05 to 5 and 0.5 to 10"
+            f"rise_m is {rise_m:g}, width_m {width_m:g}, landing_m {landing_m:g}; expected 0.05 to "
+            "5, 0.5 to 10 and 0.5 to 5"
         )
     count, half = max(1, math.ceil(rise_m / 0.18)), 0.5 * width_m
     tops = rise_m * np.arange(count, 0, -1) / count
-    ends = _LANDING_M + _TREAD_M * np.arange(count)
+    ends = landing_m + _TREAD_M * np.arange(count)
     starts = [-_BEHIND_M, *ends[:-1]]
     boxes = [
         ((float(start), -half, 0.0), (float(end), half, float(top)))
         for start, end, top in zip(starts, ends, tops, strict=True)
     ]
     # Without a texture, which further views of a scene would have to fetch.
-    stone = Material(_STONES[seed % len(_STONES)], 0.9)
+    stone = Material(STONES[seed % len(STONES)], 0.9)
     mesh = finish_mesh(join_patches([block(*box) for box in boxes]), (stone,), 40.0)
     parts = tuple(np.round(hulls.box(*box), 6) for box in boxes)
     return Solid(mesh, ConvexParts(parts))

@@ -6,7 +6,7 @@ four rules:
 - Ground surfaces, and lines that hang from masts, are bent point by point (``assets/drape.py``).
 - Buildings stay level at the height of the ground before their fronts, on a base that reaches down
   to the lowest ground below them. Detached houses behind gardens stand as high as the higher end of
-  their front, and stairs lead down from the door.
+  their front, and stairs and ramps lead down from the door (``house_entrances.py``).
 - Vehicles, and objects that are wider than high, turn with the plane through four points of the
   ground: below the wheels, or below the corners. Cameras on driving lanes belong to a vehicle.
 - All others stay upright: people at the height of the ground below their middle, objects at
@@ -32,6 +32,8 @@ from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.relief import CELL_M, Relief
 from gen_data.core.scene import Body, Camera, Lane, Light, Scene
 from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.pipeline import house_entrances
+from gen_data.pipeline.house_entrances import Ways
 from gen_data.traffic.axles import find_axles
 
 Stance = Literal["tilted", "upright", "centred", "built", "raised", "flown"]
@@ -44,20 +46,12 @@ _STOREY_M = 1.0
 _BASE_STEP_M, _SUNK_M, _INSET_M = 0.5, 0.05, 0.02
 """Depths of bases are multiples of the first; they reach below the lowest ground by the second, and
 are narrower than the building by the third."""
-_STAIRS_M, _STEPS_FROM_M, _STEPS_UNIT_M = 1.4, 0.05, 0.05
-"""Width of stairs before doors; height from which on there are any; their heights are multiples of
-the last."""
-_ALLEY = frozenset({"garden", "frontage"})
-"""Lanes on which stairs may stand."""
 # Without a texture, which further views of a scene would have to fetch.
 _CONCRETE = asset_types.Material((0.36, 0.35, 0.33), 0.9, role="facade")
 _TURN = 5e-4
 """Points of a lane are kept where its grade has changed by this much since the last one."""
 _TWIST = 1e-3
 """Cross slopes of a lane that change by less than this are one."""
-STAIRS = "stairs_m"
-"""Families of houses that may have stairs before their doors declare under this name how far those
-reach at most."""
 _FLYING = frozenset({"drone", "gimbal"})
 _HOUSES = frozenset({"building", "garage"})
 _BUILT: frozenset[Stance] = frozenset({"built", "raised"})
@@ -181,8 +175,8 @@ def _lift_bodies(
         first.setdefault(body.instance_id, body)
     leaders = {body.name: first[body.instance_id] if body.instance_id else body for body in level}
     standing = [b for b in level if leaders[b.name] is b and not _is_draped(b)]
-    ways = _Ways.of(lane for lane in lanes if lane.kind not in _ALLEY)
-    feet = [_in_garden(_foot(body, assets), body, ways, assets) for body in standing]
+    land = house_entrances.Land.of(lanes, relief)
+    feet = [_in_garden(_foot(body, assets), body, land.ways, assets) for body in standing]
     corners = np.concatenate(
         [foot.corners([b.T_world_body]) for foot, b in zip(feet, standing, strict=True)]
         or [np.zeros((0, 4, 3))]
@@ -206,7 +200,9 @@ def _lift_bodies(
     for body, foot, z in zip(standing, feet, heights, strict=True):
         if foot.stance in _BUILT and np.ptp(z) > 0.0:
             bodies += _base(body, foot, z, assets)
-            bodies += _stairs(body, foot, z, relief, assets)
+        if foot.stance == "raised" and np.ptp(z) > 0.0:
+            floor_m = _floor_m(foot.stance, z)
+            bodies += house_entrances.entrances(body, floor_m, level, land, assets)
     return tuple(bodies), moves
 
 
@@ -251,19 +247,28 @@ def _tilt(corners: Array, z: Array) -> SE3:
     return SE3((x, y, float(z.mean())), turn) @ SE3((-x, -y, 0.0))
 
 
-def _base(body: Body, foot: _Foot, z: Array, assets: AssetLibrary) -> list[Body]:
-    """A block below a building whose floor is above the lowest ground; none if nothing is open."""
+def _base(body: Body, foot: _Foot, z: Array, assets: AssetLibrary) -> Iterator[Body]:
+    """Blocks below a building whose floor is above the lowest ground; none if nothing is open."""
     floor_m = _floor_m(foot.stance, z)
     depth_m = math.ceil((floor_m - float(z.min()) + _SUNK_M) / _BASE_STEP_M) * _BASE_STEP_M
-    length_m, width_m = (round(b - a - _INSET_M, 2) for a, b in (foot.x_m, foot.y_m))
-    if floor_m - float(z.min()) < _SUNK_M or min(length_m, width_m) <= 0.0:
-        return []
-    asset = str(asset_ids.AssetId("box", {"size_m": (length_m, width_m, depth_m)}))
-    _, high = assets.bounds_m(asset)
-    middle = (0.5 * sum(foot.x_m), 0.5 * sum(foot.y_m), -high[2] - 0.001)
-    pose = SE3((0.0, 0.0, floor_m)) @ body.T_world_body @ SE3(middle)
-    name = f"{body.name}/base"
-    return [Body(name, asset, pose.rounded(), collides=False, materials=(_CONCRETE,))]
+    if floor_m - float(z.min()) < _SUNK_M:
+        return
+    parts = [(foot.y_m, foot.x_m[1])]
+    if foot.stance == "raised":
+        # The landing of the stairs carries the steps at the door.
+        parts = house_entrances.fronts_m(body, foot.y_m, assets)
+    for number, ((right_m, left_m), front_m) in enumerate(parts):
+        length_m = round(min(front_m, foot.x_m[1]) - foot.x_m[0] - _INSET_M, 2)
+        width_m = round(left_m - right_m - _INSET_M / len(parts), 2)
+        if min(length_m, width_m) <= 0.0:
+            continue
+        asset = str(asset_ids.AssetId("box", {"size_m": (length_m, width_m, depth_m)}))
+        _, high = assets.bounds_m(asset)
+        x_m = foot.x_m[0] + 0.5 * (_INSET_M + length_m)
+        pose = SE3((0.0, 0.0, floor_m)) @ body.T_world_body
+        pose = pose @ SE3((x_m, 0.5 * (right_m + left_m), -high[2] - 0.001))
+        name = f"{body.name}/base{number or ''}"
+        yield Body(name, asset, pose.rounded(), collides=False, materials=(_CONCRETE,))
 
 
 def _floor_m(stance: Stance, z: Array) -> float:
@@ -271,75 +276,21 @@ def _floor_m(stance: Stance, z: Array) -> float:
     return float(max(z[2], z[3]) if stance == "raised" else 0.5 * (z[2] + z[3]))
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Ways:
-    """The pieces of the middles of lanes in plan, and half their widths.
-
-    Attributes:
-        start_m, step_m: [n, 2].
-        half_m: [n].
-    """
-
-    start_m: Array
-    step_m: Array
-    half_m: Array
-
-    @classmethod
-    def of(cls, lanes: Iterable[Lane]) -> "_Ways":
-        """The pieces of all lanes."""
-        lines = [(np.asarray(lane.center_m)[:, :2], 0.5 * lane.width_m) for lane in lanes]
-        none = np.zeros((0, 2))
-        return cls(
-            np.concatenate([none, *(line[:-1] for line, _ in lines)]),
-            np.concatenate([none, *(np.diff(line, axis=0) for line, _ in lines)]),
-            np.concatenate([none[:, 0], *(np.full(len(line) - 1, w) for line, w in lines)]),
-        )
-
-    def reach(self, place_m: Array) -> bool:
-        """Whether a place is on any of the lanes."""
-        away, step = place_m - self.start_m, self.step_m
-        share = (away * step).sum(axis=1) / (step * step).sum(axis=1)
-        off = away - np.clip(share, 0.0, 1.0)[:, None] * step
-        return bool(((off * off).sum(axis=1) <= self.half_m * self.half_m).any())
-
-
-def _in_garden(foot: _Foot, body: Body, ways: _Ways, assets: AssetLibrary) -> _Foot:
+def _in_garden(foot: _Foot, body: Body, ways: Ways, assets: AssetLibrary) -> _Foot:
     """The foot of a house whose family has stairs, raised if its garden has room for them."""
-    room_m = families.declared(body.asset, STAIRS, None) if foot.stance == "built" else None
+    room_m = (
+        families.declared(body.asset, house_entrances.STAIRS, None)
+        if foot.stance == "built"
+        else None
+    )
     if room_m is None:
         return foot
     ends = [
         body.T_world_body.apply((np.asarray(door) * body.scale) + (room_m, 0.0, 0.0))[:2]
-        for door in _doors(body, assets)
+        for door in house_entrances.doors(body, assets)
     ]
     is_free = bool(ends) and not any(ways.reach(end) for end in ends)
     return replace(foot, stance="raised") if is_free else foot
-
-
-def _doors(body: Body, assets: AssetLibrary) -> list[Vec3]:
-    return [k.position_m for k in assets.keypoints(body.asset) if k.name == "door"]
-
-
-def _stairs(
-    body: Body, foot: _Foot, z: Array, relief: Relief, assets: AssetLibrary
-) -> Iterator[Body]:
-    """Stairs from the doors of a raised house down to the ground before them."""
-    if foot.stance != "raised":
-        return
-    lifted = SE3((0.0, 0.0, _floor_m(foot.stance, z))) @ body.T_world_body
-    for number, door in enumerate(_doors(body, assets)):
-        at = lifted @ SE3((body.scale * door[0], body.scale * door[1], 0.0))
-        rise_m = at.translation_m[2] - float(relief.height(np.array([at.translation_m]))[0])
-        if rise_m < _STEPS_FROM_M:
-            continue
-        # The lowest step lies in the ground, which slopes along the stairs' width.
-        high_m = (math.ceil(rise_m / _STEPS_UNIT_M) + 2) * _STEPS_UNIT_M
-        seed = asset_ids.parse_asset_id(body.asset).parameters.get("seed")
-        stone = seed % 4 if isinstance(seed, int) else 0
-        values = {"rise_m": round(high_m, 2), "width_m": _STAIRS_M, "seed": stone}
-        pose = (at @ SE3((0.0, 0.0, -high_m))).rounded()
-        asset = str(asset_ids.AssetId("door_stairs", values))
-        yield Body(f"{body.name}/stairs{number}", asset, pose, collides=False)
 
 
 def _rise(pose: SE3, relief: Relief) -> SE3:
@@ -356,7 +307,7 @@ def _lifted_camera(camera: Camera, lanes: Iterable[Lane], relief: Relief) -> Cam
     if camera.rig:
         return camera
     place = np.array(pose.translation_m[:2])
-    if not _Ways.of(lane for lane in lanes if lane.kind == "driving").reach(place):
+    if not Ways.of(lane for lane in lanes if lane.kind == "driving").reach(place):
         return replace(camera, T_world_camera=_raised(pose, relief))
     x, y, _ = pose.rotate(np.array([0.0, 0.0, 1.0])).tolist()
     move = _ridden(pose, math.atan2(y, x), relief)

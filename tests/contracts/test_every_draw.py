@@ -32,7 +32,7 @@ WITHOUT = {
                      "toilet_brush", "bathroom_scale", "guitar", "drill"), FIXED),
     **dict.fromkeys(("overpass", "embankment"), PARAMETRIC),
     **dict.fromkeys(("crockery", "groceries", "hanging_clothes", "horizon/skyline"), MIXED),
-    "door_stairs": "its sizes are parameters",
+    **dict.fromkeys(("door_stairs", "door_ramp"), "its sizes are parameters"),
     "bicycle": "frames take turns by seed; its other draws are pedals, colours and luggage",
     "motorcycle": "styles and riders take turns by seed, in step with their facts",
     "cyclist": "styles and riders take turns by seed, in step with their facts",

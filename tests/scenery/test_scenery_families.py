@@ -65,6 +65,8 @@ LIMITS = {
     "pedestrian_signal": (2.4, 3.3, 1500), "traffic_sign": (2.1, 3.3, 1500),
     # A path is as high as its slabs, a terrace as its parasol.
     "terrace": (0.02, 3.1, 1200), "garden_path": (0.05, 0.08, 200), "door_stairs": (0.5, 0.5, 200),
+    # The ramp rises by 0.41 m, its handrails by 0.88 m more.
+    "door_ramp": (1.29, 1.32, 600),
     **{name: (*limits.height_m, limits.triangles) for name, limits in CLUTTER.items()},
 }  # fmt: skip
 
