@@ -15,7 +15,7 @@ interval from bootstrapping over images.
 import argparse
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -47,31 +47,49 @@ def open_source(args: argparse.Namespace) -> gen_data.SampleSequence:
     return samples.relabelled() if has_map else samples
 
 
-def read_batches(
-    samples: gen_data.SampleSequence, args: argparse.Namespace
-) -> Iterator[list[tuple[NDArray[np.uint8], dict[str, Any]]]]:
-    """Batches of training samples, epoch after epoch without end.
+Target = tuple[NDArray[np.uint8], dict[str, Any]]
+"""Image [3, h, w] with boxes and labels, as of ``detection_target``."""
+
+
+def targets_of_cameras(sample: gen_data.Sample) -> list[Target]:
+    """The photographs of all cameras of a sample."""
+    cameras = (name for name, camera in sample.cameras.items() if "rgb" in camera.channels)
+    return [detection_target(sample, camera) for camera in cameras]
+
+
+def read_targets(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Iterator[Target]:
+    """Pictures of training samples, epoch after epoch without end.
 
     Small data sets are kept in memory after the first epoch: reading a sample takes longer than
     a training step on it.
     """
     epoch = {} if samples.is_bounded else {"epoch_size": args.epoch_size}
     loader = gen_data.Loader(
-        samples, detection_target, batch_size=args.batch, shuffle=True, seed=args.seed,
+        samples, targets_of_cameras, batch_size=args.batch, shuffle=True, seed=args.seed,
         workers=args.workers, **epoch,
     )  # fmt: skip
     is_small = samples.is_bounded and len(samples) <= KEPT_MAX
     rng = np.random.default_rng(args.seed)
-    seen: list[tuple[NDArray[np.uint8], dict[str, Any]]] = []
+    seen: list[Target] = []
     while not (is_small and seen):
         for batch in loader:
+            pictures = [picture for sample in batch for picture in sample]
             if is_small:
-                seen += batch
-            yield batch
+                seen += pictures
+            yield from pictures
     while True:
-        order = rng.permutation(len(seen))
-        for numbers in np.split(order, range(args.batch, len(seen), args.batch)):
-            yield [seen[number] for number in numbers]
+        yield from (seen[number] for number in rng.permutation(len(seen)))
+
+
+def batches_of_one_shape(pictures: Iterable[Target], size: int) -> Iterator[list[Target]]:
+    """Batches of pictures in order of completion: cameras may differ in the shape of images."""
+    waiting: dict[tuple[int, ...], list[Target]] = {}
+    for picture in pictures:
+        shape = picture[0].shape
+        batch = waiting.setdefault(shape, [])
+        batch.append(picture)
+        if len(batch) == size:
+            yield waiting.pop(shape)
 
 
 def train(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Detector:
@@ -87,7 +105,8 @@ def train(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Detecto
         minutes = (time.monotonic() - started_s) / 60.0
         print(f"{minutes:5.1f} min, step {step}: loss {loss:.3f}", flush=True)
 
-    return fit(model, read_batches(samples, args), used, seed=args.seed, report=report)
+    batches = batches_of_one_shape(read_targets(samples, args), args.batch)
+    return fit(model, batches, used, seed=args.seed, report=report)
 
 
 def evaluate_on(model: Detector, args: argparse.Namespace) -> dict[str, Any]:

@@ -81,11 +81,13 @@ class SurfaceRandomizer(RandomizerBase):
 
     Attributes:
         targets: Names of object groups or bodies to change; empty = every object group.
+        exclude: Tags, categories or subcategories of objects that are unchanged, such as ``food``.
     """
 
     targets: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
 
-    def find_targets(self, scene: Scene) -> Iterator[Body]:
+    def find_targets(self, scene: Scene, assets: AssetIndex) -> Iterator[Body]:
         """Yield the target bodies in the scene's order.
 
         Raises:
@@ -98,7 +100,8 @@ class SurfaceRandomizer(RandomizerBase):
             check_known(target, known, f"randomizers.{self.name}.targets: there is no")
         wanted = set(self.targets) or groups
         for body in scene.bodies:
-            if body.group in wanted or body.name.partition("/")[0] in wanted:
+            named = body.group in wanted or body.name.partition("/")[0] in wanted
+            if named and not (self.exclude and assets.get(body.asset).words & set(self.exclude)):
                 yield body
 
     def change_targets(
@@ -117,7 +120,7 @@ class SurfaceRandomizer(RandomizerBase):
             slots: Indices of the materials to change; empty = all.
         """
         changed = []
-        for body in self.find_targets(scene):
+        for body in self.find_targets(scene, assets):
             fields = draw()
             if fields is not None:
                 changed.append(_set_materials(body, assets, fields, slots))

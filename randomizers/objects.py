@@ -23,7 +23,8 @@ class Objects(GroupRandomizer):
         count: Number of objects.
         kinds: Number of categories that they are drawn from, as in a bowl of apples; 0 = all.
         scale: Factor on an object's size.
-        upright: Whether an object starts upright; otherwise at any rotation (placement drop only).
+        upright: Whether an object starts upright; otherwise at any rotation
+            (placements drop and pile).
     """
 
     type: Literal["objects"] = "objects"

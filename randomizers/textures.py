@@ -62,7 +62,7 @@ class Textures(SurfaceRandomizer):
     ) -> Scene:
         """The scene with a drawn image on the prints of every target."""
         changed = []
-        for body in self.find_targets(scene):
+        for body in self.find_targets(scene, assets):
             if self.categories and assets.get(body.asset).category not in self.categories:
                 continue
             fields = draw()

@@ -59,7 +59,7 @@ class VehicleLights(base.SurfaceRandomizer):
         """Return the scene with drawn states of all vehicle lights."""
         dark = daylight.is_dark(scene)
         bodies, lights, states = [], list(scene.lights), {}
-        for body in self.find_targets(scene):
+        for body in self.find_targets(scene, assets):
             on, braking = self.headlights.draw(rng), self.braking.draw(rng)
             side, beam_cd = self.indicator.draw(rng), self.beam_cd.draw(rng)
             on = on or dark

@@ -104,7 +104,7 @@ class VehiclePaint(SurfaceRandomizer):
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its vehicles painted; the same number of draws for each."""
         painted = []
-        for body in self.find_targets(scene):
+        for body in self.find_targets(scene, assets):
             paint = self._draw_paint(rng)
             anew, dirt = self.probability.draw(rng), self.dirt.draw(rng)
             painted.append(_finish(body, assets, paint if anew else None, dirt))

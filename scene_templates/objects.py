@@ -78,7 +78,7 @@ class AssetChoice(Strict):
         for asset_id in self.ids:
             members = assets.variants(asset_id) or (assets.get(asset_id),)
             found |= {a.asset_id: a for a in members}
-        fitting = [asset for asset in found.values() if not _words(asset) & set(self.exclude)]
+        fitting = [asset for asset in found.values() if not asset.words & set(self.exclude)]
         return tuple(sorted(asset.asset_id for asset in self._select_preferred(fitting)))
 
     def _select_preferred(self, fitting: list[Asset]) -> Iterator[Asset]:
@@ -193,11 +193,6 @@ class Objects(element.Element):
                 "expected fewer objects or a larger surface"
             )
         return points
-
-
-def _words(asset: Asset) -> set[str]:
-    """Words that exclude an asset."""
-    return {asset.category, f"{asset.category}/{asset.subcategory}", *asset.tags}
 
 
 def empty_group(name: str, placement: Placement) -> ObjectGroup:

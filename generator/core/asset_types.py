@@ -314,3 +314,8 @@ class Asset:
     subcategory: str = ""
     attributes: tuple[tuple[str, str], ...] = ()
     symmetries: tuple[Symmetry, ...] = ()
+
+    @property
+    def words(self) -> frozenset[str]:
+        """Tags, category and ``category/subcategory``, by which YAML excludes it."""
+        return frozenset((self.category, f"{self.category}/{self.subcategory}", *self.tags))

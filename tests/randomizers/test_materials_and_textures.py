@@ -85,6 +85,16 @@ def test_what_is_printed_stays_as_it_is(made: Callable[[tuple[str, ...]], Random
     assert now.materials[1] != Material()
 
 
+@pytest.mark.parametrize("kind", [Colors, Materials, Textures])
+def test_excluded_objects_keep_their_looks(kind: type[RandomizerBase]) -> None:
+    """By tag or category; the others change."""
+    wood = {"textures": ("wood",)} if kind is Textures else {}
+    scene = scene_with("brick", "ball", "bottle")
+    made = kind(name="k", probability=ALWAYS, exclude=("toy", "bottle"), **wood)  # type: ignore[call-arg]
+
+    assert changed(scene, after(made, scene)) == {"clutter/0"}
+
+
 @looks
 def test_unknown_target_is_named(made: Callable[[tuple[str, ...]], RandomizerBase]) -> None:
     with pytest.raises(ConfigError, match=r"targets: there is no 'tabel'.*did you mean 'table'"):

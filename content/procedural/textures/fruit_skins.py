@@ -89,10 +89,13 @@ def apple_skin(rng: VariantRng) -> TextureData:
 
 
 def citrus_peel(rng: VariantRng) -> TextureData:
-    """Dimpled by oil glands. Seeds below 1000 are oranges, below 2000 lemons, others limes."""
+    """Dimpled by oil glands. Seeds below 1000 are oranges, below 2000 lemons, others limes.
+
+    The last lemon is from a spectrum (Vrhel et al. 1994); the other colours are assumed.
+    """
     codes = (
         ("#e8791a", "#f08c1e", "#e06a12", "#eb9a2a", "#e6a032", "#d96012"),
-        ("#f0cf2c", "#f4da45", "#e6c21f", "#ddc52f"),
+        ("#f0cf2c", "#f4da45", "#e6c21f", "#e2b811"),
         ("#4f7a24", "#6b8f2c", "#3f6a20", "#93a534"),
     )[min(rng.seed // 1000, 2)]
     base = draw_color(codes, 0.05, rng)
@@ -112,12 +115,15 @@ def citrus_peel(rng: VariantRng) -> TextureData:
 def banana_peel(rng: VariantRng, ripe: float = -1.0) -> TextureData:
     """From green over yellow to spotted brown, with dark tips; ``ripe`` in [0, 1], below 0 = drawn.
 
-    The stem is at the lower end of the image.
+    The stem is at the lower end of the image. Hues by ripeness are those that Ringer and Blanke
+    (2021) measured at stages R2 to R7; green, the peel that has just turned and brown spots are
+    from Kajuna et al. (1995; a*) and from spectra of Vrhel et al. (1994). Lightness and chroma of
+    the other stages are assumed.
     """
     drawn = rng.between(0.0, 1.0)
     ripe = drawn if ripe < 0.0 else ripe
-    stops = ((0.0, "#8fae3a"), (0.18, "#c9c43c"), (0.35, "#e6c832"), (0.75, "#e9be2e"),
-             (1.0, "#c99a2e"))  # fmt: skip
+    stops = ((0.0, "#8a9e4c"), (0.15, "#bfb25b"), (0.25, "#caba5f"), (0.35, "#d4c062"),
+             (0.45, "#d8be61"), (0.6, "#dcbb59"), (0.8, "#d7b24f"), (1.0, "#c49a49"))  # fmt: skip
     base = np.array(
         [np.interp(ripe, [s for s, _ in stops], [float(color(c)[i]) for _, c in stops])
          for i in range(3)], dtype=np.float32,
@@ -125,22 +131,25 @@ def banana_peel(rng: VariantRng, ripe: float = -1.0) -> TextureData:
     y, _ = rows_and_columns()
     wander = 0.02 * _soft(5, 2, rng)
     ends = smoothstep(0.24, 0.03, y + wander) + smoothstep(0.78, 0.97, y + wander)
-    albedo = mix_colors(base * (1 + 0.05 * _soft(3, 3, rng))[..., None], color("#a3b23e"),
+    albedo = mix_colors(base * (1 + 0.05 * _soft(3, 3, rng))[..., None], color("#8a9e4c"),
                         ends * (0.8 - 0.75 * ripe))  # fmt: skip
     lines = smoothstep(0.55, 0.8, perlin((4, 70), rng)) * 0.1
     count = int(900 * max(0.0, ripe - 0.35) ** 1.5) + rng.choose((0, 6))
     spots = _specks(count, (0.8, 5.0 + 5.0 * max(0.0, ripe - 0.6)), rng)
     bruise = smoothstep(0.8, 1.3, _soft(5, 3, rng) + 0.6 * np.float32(ripe))
     brown = np.clip(0.85 * spots + lines + 0.6 * bruise, 0, 1)
-    albedo = mix_colors(albedo, color("#5f411c"), brown)
+    albedo = mix_colors(albedo, color("#564339"), brown)
     tips = smoothstep(0.03, 0.012, y + 0.5 * wander) + smoothstep(0.955, 0.985, y + 0.5 * wander)
     albedo = mix_colors(albedo, color("#3f3119"), (0.5 + 0.45 * ripe) * tips)
     return texture(_label(albedo, rng) if rng.chance(0.25) else albedo)
 
 
 def pear_skin(rng: VariantRng) -> TextureData:
-    """Green to yellow, red or brown, freckled with lenticels."""
-    codes = ("#b5b83a", "#c7b548", "#96a03a", "#9c7a45", "#b8bd58", "#8a6a34", "#a35a34")
+    """Green to yellow, red or brown, freckled with lenticels.
+
+    The third colour is from a spectrum (Vrhel et al. 1994); the others are assumed.
+    """
+    codes = ("#b5b83a", "#c7b548", "#9e9a45", "#9c7a45", "#b8bd58", "#8a6a34", "#a35a34")
     base = draw_color(codes, 0.05, rng)
     blush = color(rng.choose(("#b0583a", "#a88a3a", "#8f9a3a", "#9a3a2c")))
     cover = 0.7 * smoothstep(0.0, 0.9, _soft(2, 3, rng) + 0.5 * _sunny_side(rng))
