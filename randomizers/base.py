@@ -9,6 +9,7 @@ from pydantic import Field
 
 from gen_data.config.base_model import NAME_PATTERN, Strict
 from gen_data.core import asset_types, bounded_cache, se3, streams
+from gen_data.core.asset_words import check_words
 from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, one_of
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Body, Scene
@@ -103,6 +104,12 @@ class SurfaceRandomizer(RandomizerBase):
             named = body.group in wanted or body.name.partition("/")[0] in wanted
             if named and not (self.exclude and assets.get(body.asset).words & set(self.exclude)):
                 yield body
+
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """See ``RandomizerBase.check``; excluded words are checked, too."""
+        super().check(scene, assets)
+        targets = (assets.get(body.asset) for body in scene.bodies)
+        check_words(self.exclude, targets, assets, f"randomizers.{self.name}.exclude")
 
     def change_targets(
         self,

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from gen_data.config.base_model import Strict
 from gen_data.core import errors
 from gen_data.core.asset_types import Asset
+from gen_data.core.asset_words import check_words
 from gen_data.core.bounded_cache import CountCache, ObjectCache
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members
@@ -62,22 +63,23 @@ class AssetChoice(Strict):
         """Find the ids of all matching assets, sorted.
 
         Raises:
-            ConfigError: no asset matches.
+            ConfigError: no asset matches, or an excluded word is unknown.
             AssetError: an id is unknown.
         """
         known = _resolved.get(assets, lambda: CountCache(_CHOICES))
-        kept = known.get(repr(self), lambda: self._resolve(assets))
+        kept = known.get(repr(self), lambda: self._resolve(assets, field))
         if not kept:
             raise errors.ConfigError(f"{field}: no asset matches; expected other tags or ids")
         return kept
 
-    def _resolve(self, assets: AssetIndex) -> tuple[str, ...]:
+    def _resolve(self, assets: AssetIndex, field: str) -> tuple[str, ...]:
         found = {a.asset_id: a for a in assets.find(self.tags)} if self.tags else {}
         for tag in self.any_of:
             found |= {a.asset_id: a for a in assets.find((tag,))}
         for asset_id in self.ids:
             members = assets.variants(asset_id) or (assets.get(asset_id),)
             found |= {a.asset_id: a for a in members}
+        check_words(self.exclude, found.values(), assets, f"{field}.exclude")
         fitting = [asset for asset in found.values() if not asset.words & set(self.exclude)]
         return tuple(sorted(asset.asset_id for asset in self._select_preferred(fitting)))
 

@@ -55,6 +55,26 @@ def test_a_wrong_parameter_of_an_asset_is_told_where_it_is_named(
     assert fact in str(told.value)
 
 
+@pytest.mark.parametrize(
+    ("override", "place"),
+    [
+        ("elements.clutter.assets={tags: [household], exclude: [foood]}",
+         "--set:1:54: elements[3].assets.exclude: "),
+        ("randomizers.colors.exclude=[foood]", "--set:1:28: randomizers[4].exclude: "),
+    ],
+)  # fmt: skip
+def test_an_excluded_word_that_no_object_has_is_refused(override: str, place: str) -> None:
+    """It left out nothing, silently."""
+    with (
+        pytest.raises(ConfigError) as told,
+        open_pipeline(load_config("tabletop.yaml", overrides=[override])),
+    ):
+        pass
+    assert str(told.value).startswith(place), told.value
+    assert "no object has 'foood'" in str(told.value)
+    assert "did you mean 'food'?" in str(told.value)
+
+
 def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: Path) -> None:
     (tmp_path / "props").mkdir()
     path = tmp_path / "mine.yaml"
