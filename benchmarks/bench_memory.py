@@ -26,7 +26,7 @@ from gen_data.assets.library import open_library
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.runner import identity, resident_memory
-from gen_data.runner.run import RunProgress, run
+from gen_data.runner.run import RunProgress, Settings, run
 
 SMALL_PX = {"tabletop": (96, 72), "street": (124, 38)}
 FIELDS = ("Rss", "Pss", "Pss_Anon", "Private_Dirty", "Shared_Clean")
@@ -137,10 +137,12 @@ def main() -> None:
     print(f"{machine()}, {arguments.workers} worker(s), {arguments.scene}, {' '.join(overrides)}")
     with tempfile.TemporaryDirectory() as folder:
         summary = run(
-            identity.make_plan(factory), factory, Path(folder) / "out", workers=arguments.workers,
-            resume_command="", progress=recorder.observe,
-            licences=partial(identity.format_licences, factory),
-        )  # fmt: skip
+            identity.make_plan(factory),
+            factory,
+            Path(folder) / "out",
+            Settings(arguments.workers, progress=recorder.observe),
+            partial(identity.format_licences, factory),
+        )
     print(format_summary(summary))
     for name in ("Rss", "Pss"):
         peak = max((reading[name] for _, reading in recorder.rows), default=0.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 from gen_data.assemble.config import Config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.runner.identity import format_licences, make_plan
-from gen_data.runner.run import Summary, run
+from gen_data.runner.run import Settings, Summary, run
 
 
 def measure_run(config: Config, n: int, workers: int) -> Summary:
@@ -17,9 +17,12 @@ def measure_run(config: Config, n: int, workers: int) -> Summary:
     factory = PipelineFactory(config, n)
     with tempfile.TemporaryDirectory() as folder:
         return run(
-            make_plan(factory), factory, Path(folder) / "out", workers=workers, resume_command="",
-            licences=partial(format_licences, factory),
-        )  # fmt: skip
+            make_plan(factory),
+            factory,
+            Path(folder) / "out",
+            Settings(workers),
+            partial(format_licences, factory),
+        )
 
 
 def cpu_s() -> float:

@@ -21,7 +21,7 @@ from benchmarks.runs import machine
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.runner.identity import format_licences, make_plan
-from gen_data.runner.run import RunProgress, run
+from gen_data.runner.run import RunProgress, Settings, run
 from gen_data.runner.verify import verify
 
 WORKERS = (1, 2, 4, 8, 16, 64, 256, 1000)
@@ -134,10 +134,8 @@ def _measure(name: str, n: int, overrides: Sequence[str]) -> tuple[Costs, dict[s
 
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
-        summary = run(
-            plan, factory, out, workers=0, resume_command="", progress=observe,
-            licences=partial(format_licences, factory),
-        )  # fmt: skip
+        licences = partial(format_licences, factory)
+        summary = run(plan, factory, out, Settings(progress=observe), licences)
         reached_s["end"] = time.process_time()
         verify(out)
     verified_s = time.process_time() - reached_s["end"]

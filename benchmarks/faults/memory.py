@@ -83,10 +83,9 @@ def _run_in(group: Path, folder: Path) -> tuple[int | None, str]:
 def _enter_and_run(group: Path, folder: Path, message: Path) -> None:
     (group / "cgroup.procs").write_text(str(os.getpid()))
     try:
-        run(
-            doubles.fake_plan(), GreedyFactory(10, doubles.Trouble()), folder / "out", workers=1,
-            resume_command=doubles.RESUME, settings=Settings(write_media=doubles.write_raw_images),
-        )  # fmt: skip
+        settings = Settings(1, doubles.RESUME, write_media=doubles.write_raw_images)
+        factory = GreedyFactory(10, doubles.Trouble())
+        run(doubles.fake_plan(), factory, folder / "out", settings)
     except GenDataError as error:
         message.write_text(f"{type(error).__name__}: {error}", "utf-8")
         sys.exit(error.exit_code)

@@ -72,10 +72,8 @@ class Recording:
             delay_s: Duration of a sample, to let a run last.
         """
         replay: Callable[[], Any] = self.replay if delay_s == 0.0 else Slow(self.replay, delay_s)
-        return run(
-            self.plan, replay, out, workers=workers, resume_command=RESUME, licences=str,
-            settings=Settings(shards=shards, repair=repair),
-        )  # fmt: skip
+        settings = Settings(workers, RESUME, shards=shards, repair=repair)
+        return run(self.plan, replay, out, settings, licences=str)
 
 
 @dataclass(frozen=True)

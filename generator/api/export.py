@@ -65,6 +65,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     from gen_data.assemble.pipeline_factory import check_scene, ready_exporters
     from gen_data.packs.provision import open_assets
     from gen_data.runner.exports import export as write_exports
+    from gen_data.runner.run import Settings
     from gen_data.runner.stored import StoredSamples
 
     if not formats:
@@ -85,10 +86,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         config,
         exporters,
         Path(out),
-        workers=count_workers(workers),
-        resume_command=resume_command,
-        progress=on_progress,
-        force=force,
+        Settings(count_workers(workers), resume_command, on_progress, is_forced=force),
     )
     return check_label_gaps(summary)
 

@@ -91,12 +91,13 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         factory = make_factory(loaded, n)
         settings = replace(
             make_settings(factory, skip_failed, sample_timeout_s),
+            resume_command=resume_command,
+            progress=on_progress,
             repair=repair,
             allow_mixed_numerics=allow_mixed_numerics,
             is_forced=force,
         )
-        choice = RunChoice(out, workers, shards, cluster, on_progress, resume_command)
-        return run_factory(factory, settings, standby, choice)
+        return run_factory(factory, settings, standby, RunChoice(out, workers, shards, cluster))
 
 
 @dataclass(frozen=True)
@@ -107,8 +108,6 @@ class RunChoice:
     workers: int | None
     shards: tuple[int, int] | None
     cluster: RayCluster | None
-    on_progress: Callable[[RunProgress], None] | None
-    resume_command: str
 
 
 def run_factory(
@@ -127,35 +126,19 @@ def run_factory(
     ):
         plan = plan or make_plan(factory)
         shards = choice.shards and check_shards(choice.shards, plan.shard_count)
-        settings = replace(settings, open_pool=pool, shards=shards)
-        summary = _run(factory, plan, folder, workers, settings, choice)
+        settings = replace(settings, workers=workers, open_pool=pool, shards=shards)
+        summary = _run(factory, plan, folder, settings)
     return check_label_gaps(summary)
 
 
-def _run(
-    factory: PipelineFactory,
-    plan: Plan,
-    folder: Path | str,
-    workers: int,
-    settings: Settings,
-    choice: RunChoice,
-) -> Summary:
+def _run(factory: PipelineFactory, plan: Plan, folder: Path | str, settings: Settings) -> Summary:
     """Run the plan of a factory, and name unused contents of the user's files."""
     from gen_data.assets.file_remarks import warn_of_remarks
     from gen_data.runner.identity import format_licences
     from gen_data.runner.run import run
 
     told = warn_of_remarks(factory.library, plan.assets)
-    summary = run(
-        plan,
-        factory,
-        folder,
-        workers=workers,
-        resume_command=choice.resume_command,
-        licences=partial(format_licences, factory),
-        settings=settings,
-        progress=choice.on_progress,
-    )
+    summary = run(plan, factory, folder, settings, partial(format_licences, factory))
     # Of files that workers were the first to read.
     warn_of_remarks(factory.library, plan.assets, read_max=0, told=told)
     return summary

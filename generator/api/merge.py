@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.api import label_gaps, repair
+from gen_data.api.config import count_workers
 from gen_data.core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def merge(
         DeterminismError: two parts have the same shard with different bytes.
     """
     from gen_data.runner.merge import common_plan, gather_shards
+    from gen_data.runner.run import Settings
     from gen_data.runner.store import LocalStore
 
     folders = [Path(part) for part in parts]
@@ -50,12 +52,11 @@ def merge(
     plan = common_plan(folders)
     store = LocalStore(target.absolute(), resume_command)
     gather_shards(plan, folders, store, allow_mixed_numerics)
-    summary = repair.restore(
-        plan,
-        target,
-        workers=workers,
+    settings = Settings(
+        count_workers(workers),
+        resume_command,
+        on_progress,
         allow_mixed_numerics=allow_mixed_numerics,
-        on_progress=on_progress,
-        resume_command=resume_command,
     )
+    summary = repair.restore(plan, target, settings)
     return label_gaps.check_label_gaps(summary)

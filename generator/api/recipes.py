@@ -149,8 +149,13 @@ def pull(  # noqa: PLR0913  (keywords of one front door)
         generation.check_arguments(file.path, file.recipe.n, out, workers, False)
         factory, plan = prepare(file, semantic, trust)
         settings = generation.make_settings(factory, bool(file.recipe.failed), None)
-        settings = replace(settings, proof=file.recipe.proof(semantic))
-        choice = generation.RunChoice(out, workers, shards, cluster, on_progress, resume_command)
+        settings = replace(
+            settings,
+            resume_command=resume_command,
+            progress=on_progress,
+            proof=file.recipe.proof(semantic),
+        )
+        choice = generation.RunChoice(out, workers, shards, cluster)
         try:
             summary = generation.run_factory(factory, settings, standby, choice, plan)
         except errors.DeterminismError as error:

@@ -14,6 +14,7 @@ from gen_data.core.errors import StorageError, no_folder
 if TYPE_CHECKING:
     from gen_data.runner.plan import Plan
     from gen_data.runner.progress import RunProgress, Summary
+    from gen_data.runner.run import Settings
 
 
 def repair(
@@ -47,6 +48,7 @@ def repair(
     """
     from gen_data.runner.plan import parse_plan
     from gen_data.runner.repair import read_declared_plan
+    from gen_data.runner.run import Settings, lacks_samples
     from gen_data.runner.store import LocalStore
 
     path = Path(folder)
@@ -59,49 +61,25 @@ def repair(
             "  With the configuration of the data set, this command restores it:\n"
             f"    gen-data --config FILE --n N --out {shlex.quote(str(path))} --repair"
         )
-    return restore(
-        parse_plan(data, path),
-        path,
-        source=None if source is None else Path(source),
-        workers=workers,
+    plan = parse_plan(data, path)
+    settings = Settings(
+        count_workers(workers),
+        resume_command,
+        on_progress,
         repair=True,
-        on_progress=on_progress,
-        resume_command=resume_command,
+        skip_failed=lacks_samples(LocalStore(path.absolute()), plan),
     )
+    return restore(plan, path, settings, None if source is None else Path(source))
 
 
-def restore(  # noqa: PLR0913  (keywords of its callers)
-    plan: Plan,
-    path: Path,
-    *,
-    source: Path | None = None,
-    workers: int | None,
-    repair: bool = False,
-    allow_mixed_numerics: bool = False,
-    on_progress: Callable[[RunProgress], None] | None,
-    resume_command: str,
-) -> Summary:
+def restore(plan: Plan, path: Path, settings: Settings, source: Path | None = None) -> Summary:
     """Finish the data set in ``path`` from its plan alone; see ``repair`` and ``generate``."""
     from threadpoolctl import threadpool_limits
 
     from gen_data.runner.regeneration import plan_regeneration, refuse_changes
-    from gen_data.runner.run import Settings, lacks_samples, run
-    from gen_data.runner.store import LocalStore
+    from gen_data.runner.run import run
 
     made = plan_regeneration(path, plan, source)
-    refuse_changes(path, made.changes, "repair it" if repair else "finish it")
+    refuse_changes(path, made.changes, "repair it" if settings.repair else "finish it")
     with threadpool_limits(limits=1):
-        return run(
-            plan,
-            made.make_pipeline,
-            path,
-            workers=count_workers(workers),
-            resume_command=resume_command,
-            licences=made.licences,
-            settings=Settings(
-                repair=repair,
-                allow_mixed_numerics=allow_mixed_numerics,
-                skip_failed=repair and lacks_samples(LocalStore(path.absolute()), plan),
-            ),
-            progress=on_progress,
-        )
+        return run(plan, made.make_pipeline, path, settings, made.licences)

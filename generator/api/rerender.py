@@ -69,6 +69,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
 
     from gen_data.assemble.config import load_config
     from gen_data.runner.rerender import rerender as render_again
+    from gen_data.runner.run import Settings
     from gen_data.runner.stored import StoredSamples
 
     stored, source = StoredSamples(folder), os.fspath(folder)
@@ -86,11 +87,8 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
             was,
             now,
             Path(out),
-            redraw=redraw,
-            workers=config.count_workers(workers),
-            resume_command=resume_command,
-            progress=on_progress,
-            force=force,
+            Settings(config.count_workers(workers), resume_command, on_progress, is_forced=force),
+            redraw,
         )
     return label_gaps.check_label_gaps(summary)
 

@@ -6,7 +6,7 @@ data set's plan with other exporters; the result has the same bytes as the data 
 with these exporters gives.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from gen_data.core.interfaces import DatasetInfo, Exporter, reading_paths
 from gen_data.core.sample import Sample
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.runner import durable_files, labels, layout, plan, seal, shard_record, verify
-from gen_data.runner.progress import RunProgress, Summary
+from gen_data.runner.progress import Summary
 from gen_data.runner.provenance import SCENES_NAME
 from gen_data.runner.run import Settings, run
 from gen_data.runner.stored import RECORDED, CheckedSamples, StoredSamples, check_digest
@@ -162,16 +162,12 @@ def _is_same_disk(one: Path, other: Path) -> bool:
     return one.stat().st_dev == other.stat().st_dev
 
 
-def export(  # noqa: PLR0913  (keywords of one front door)
+def export(
     stored: StoredSamples,
     config: "Config",
     exporters: Mapping[str, Exporter],
     out: Path,
-    *,
-    workers: int,
-    resume_command: str,
-    progress: Callable[[RunProgress], None] | None = None,
-    force: bool = False,
+    settings: Settings,
 ) -> Summary:
     """Write a finished data set in other formats, as a separate data set.
 
@@ -181,10 +177,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         exporters: By name; checked.
         out: Folder of the new data set. Its shards are hard links to the old one's, or
             copies on another file system.
-        workers: See ``run``.
-        resume_command: See ``run``.
-        progress: See ``run``.
-        force: Start although the disk is probably too small.
+        settings: Choices of the caller; sizes of files, writers and failed samples are added.
 
     Raises:
         GenDataError: see ``run``.
@@ -200,18 +193,15 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         replace(stored.plan, config=config.resolved, format_version=plan.FORMAT_VERSION),
         StoredPipeline(source, exporters, config.asset_folders),
         out,
-        workers=workers,
-        resume_command=resume_command,
-        progress=progress,
-        licences=None if text is None else lambda _: text,
-        settings=Settings(
+        replace(
+            settings,
             write_media=files.link_media,
             write_records=files.link_records,
             linked_digests=files.digests,
             # The size of new files of later shards follows from the first one.
             sample_bytes=NEW_BYTES + (0.0 if linked else linked_bytes),
             linked_bytes=linked_bytes if linked else 0.0,
-            is_forced=force,
             failed=stored.failed,
         ),
+        licences=None if text is None else lambda _: text,
     )

@@ -5,7 +5,7 @@ two data sets are pairs: they differ in the changes only (counterfactual images)
 """
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +25,7 @@ from gen_data.pipeline.pipeline import DrawnView
 from gen_data.runner.failed_sample import FailedSample
 from gen_data.runner.identity import format_licences, make_plan
 from gen_data.runner.plan import Plan
-from gen_data.runner.progress import RunProgress, Summary
+from gen_data.runner.progress import Summary
 from gen_data.runner.run import Settings, run
 from gen_data.runner.stored import CheckedSamples, StoredSamples
 from gen_data.runner.verify import check_source
@@ -176,17 +176,13 @@ def _geometry(scene: Scene) -> object:
     return bodies, objects, scene.tracks, scene.articulations
 
 
-def rerender(  # noqa: PLR0913  (keywords of one front door)
+def rerender(
     stored: StoredSamples,
     was: Config,
     now: Config,
     out: Path,
-    *,
+    settings: Settings,
     redraw: Sequence[str] = (),
-    workers: int,
-    resume_command: str,
-    progress: Callable[[RunProgress], None] | None = None,
-    force: bool = False,
 ) -> Summary:
     """Render the scenes of a finished data set again, as a separate data set.
 
@@ -195,11 +191,8 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         was: Its configuration.
         now: The changed configuration.
         out: Folder of the new data set.
+        settings: Choices of the caller; the size of a sample and failed samples are added.
         redraw: Names of further randomizers to draw again.
-        workers: See ``run``.
-        resume_command: See ``run``.
-        progress: See ``run``.
-        force: Start although the disk is probably too small.
 
     Raises:
         ConfigError: the change is none of sensors, rendering, annotations, exporters, labels or
@@ -211,15 +204,12 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         plan,
         maker,
         out,
-        workers=workers,
-        resume_command=resume_command,
-        progress=progress,
-        licences=lambda used: format_licences(maker.factory, used),
-        settings=Settings(
+        replace(
+            settings,
             sample_bytes=estimate_sample_bytes(now, maker.factory.info),
-            is_forced=force,
             failed=_absent(stored),
         ),
+        licences=lambda used: format_licences(maker.factory, used),
     )
 
 

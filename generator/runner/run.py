@@ -50,6 +50,9 @@ class Settings:
     """Settings of a run; they change no byte of the data set.
 
     Attributes:
+        workers: Processes that generate shards; 0 generates them in this process.
+        resume_command: Command that error messages give for resuming.
+        progress: Called after each sample and shard.
         repair: Hash existing files before anything else, restore a damaged ``plan.json``, and move
             files that do not belong to the data set to ``run/quarantine``. Without it, damaged
             shards are also generated again, but files of an unfinished data set are hashed last.
@@ -69,6 +72,9 @@ class Settings:
             picklable.
     """
 
+    workers: int = 0
+    resume_command: str = ""
+    progress: Callable[[RunProgress], None] | None = None
     repair: bool = False
     allow_mixed_numerics: bool = False
     skip_failed: bool = False
@@ -89,28 +95,22 @@ def _silent(progress: RunProgress) -> None:
     del progress
 
 
-def run(  # noqa: PLR0913  (every argument is the choice of the caller)
+def run(
     plan: Plan,
     make_pipeline: Callable[[], EnteredPipeline],
     out: Path | str,
-    *,
-    workers: int,
-    resume_command: str,
-    progress: Callable[[RunProgress], None] | None = None,
+    settings: Settings,
     licences: LicencesOf | None = None,
-    settings: Settings | None = None,
 ) -> Summary:
     """Generate a data set, or the missing part of an unfinished one.
 
     Args:
         plan: The identity of the data set.
         out: Its folder, or a URL of object storage: absent, empty, or started with an equal plan.
-        make_pipeline: Makes the same pipeline in any process; picklable unless ``workers`` is 0.
-        workers: Processes that generate shards; 0 generates them in this process, for debugging.
-        resume_command: Command that error messages give for resuming.
-        progress: Called after each sample and shard.
+        make_pipeline: Makes the same pipeline in any process; picklable unless the settings have
+            no workers.
+        settings: Workers, and further choices of the caller.
         licences: Makes the text of ``LICENSES-ASSETS.md``; None = no such file.
-        settings: None = the defaults.
 
     Raises:
         StorageError: the folder belongs to another data set, or cannot be written.
@@ -120,9 +120,8 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
         DeterminismError: a shard, or a repaired data set, came out differently the second time.
         Interrupted: Ctrl-C or SIGTERM; committed shards stay.
     """
-    settings = settings or Settings()
-    store = open_store(out, resume_command)
-    message = f"finished shards are kept; resume with:\n    {resume_command}"
+    store = open_store(out, settings.resume_command)
+    message = f"finished shards are kept; resume with:\n    {settings.resume_command}"
     with Interruption(message) as interruption:
         with interruption.immediate(), store.errors():
             if settings.repair:
@@ -143,7 +142,7 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
                 settings.skip_failed,
                 settings.failed,
             )
-            run_ = _Run(job, workers, progress or _silent, settings, interruption)
+            run_ = _Run(job, settings.progress or _silent, settings, interruption)
             return replace(run_.execute(licences), folder=str(out))
 
 
@@ -178,7 +177,6 @@ def _read_seal(store: LocalStore, plan: Plan) -> SealedBefore:
 @dataclass(frozen=True)
 class _Run:
     job: Job
-    workers: int
     progress: Callable[[RunProgress], None]
     settings: Settings
     interruption: Interruption
@@ -287,14 +285,14 @@ class _Run:
     def _generate(self, scan: Scan, monitor: RunMonitor) -> None:
         if not scan.missing:
             return
-        if self.workers == 0:
+        if self.settings.workers == 0:
             with self.interruption.immediate():
                 self._generate_here(scan, monitor)
             return
         supervisor = Supervisor(
             shards=scan.missing,
             samples_of=self.job.plan.samples_of,
-            workers=self.workers,
+            workers=self.settings.workers,
             describe_sample=self.job.store.reproduce_command,
             limits=self.settings.limits,
             skip_failed=self.settings.skip_failed,

@@ -11,6 +11,7 @@ from gen_data.lab.certificate.examined import Examined
 from gen_data.lab.certificate.finding import Contradictions, Finding, not_checked
 from gen_data.runner import durable_files, layout, seal
 from gen_data.runner.exports import export
+from gen_data.runner.run import Settings
 from gen_data.runner.store import LocalStore
 
 
@@ -29,7 +30,7 @@ def check_written_again(examined: Examined) -> Iterator[Finding]:
     scratch = store.scratch_dir()
     try:
         exporters = ready_exporters(config, stored.info, examined.library)
-        export(stored, config, exporters, scratch / "again", workers=0, resume_command="certify")
+        export(stored, config, exporters, scratch / "again", Settings(resume_command="certify"))
         again = seal.read_sums(scratch / "again").digests
     finally:
         shutil.rmtree(scratch)

@@ -221,10 +221,12 @@ def make(
         fake_plan(n, shard_size),
         FakeFactory(n, trouble or Trouble()),
         out,
-        workers=workers,
-        resume_command=RESUME,
+        replace(
+            settings or Settings(write_media=write_raw_images),
+            workers=workers,
+            resume_command=RESUME,
+        ),
         licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
-        settings=settings or Settings(write_media=write_raw_images),
     )
 
 

@@ -49,11 +49,8 @@ def make_at(
         replace(fake_plan(n), **changes),
         FakeFactory(n),
         url,
-        workers=0,
-        resume_command="again",
-        progress=progress,
+        Settings(resume_command="again", progress=progress, write_media=write_raw_images),
         licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
-        settings=Settings(write_media=write_raw_images),
     )
 
 

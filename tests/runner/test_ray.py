@@ -40,9 +40,7 @@ def make(out: Path, trouble: doubles.Trouble, workers: int = 0) -> Summary:
         replace(doubles.fake_plan(N, SHARD_SIZE), versions={}),
         doubles.FakeFactory(N, trouble),
         out,
-        workers=workers,
-        resume_command="",
-        settings=Settings(write_media=doubles.write_raw_images, open_pool=cluster.open_pool),
+        Settings(workers, write_media=doubles.write_raw_images, open_pool=cluster.open_pool),
     )
 
 

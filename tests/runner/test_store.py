@@ -23,7 +23,7 @@ from gen_data.core.se3 import SE3
 from gen_data.runner import durable_files
 from gen_data.runner.plan import load_plan
 from gen_data.runner.provenance import parse_scene, scene_line
-from gen_data.runner.run import run
+from gen_data.runner.run import Settings, run
 from gen_data.runner.shard import Job, make_shard
 from gen_data.runner.store import FolderState, LocalStore
 from gen_data.runner.verify import verify
@@ -173,7 +173,7 @@ def test_another_plan_is_refused_naming_the_field(
     before = doubles.tree_digest(out)
     plan, factory = doubles.fake_plan(n, **changes), doubles.FakeFactory(n)
     with pytest.raises(StorageError, match=message):
-        run(plan, factory, out, workers=0, resume_command=doubles.RESUME)
+        run(plan, factory, out, Settings())
     assert doubles.tree_digest(out) == before
 
 
@@ -262,7 +262,7 @@ def test_no_invalid_sample_is_left(tmp_path: Path, change: dict[str, object], me
 
     make = partial(Invalid, 10, doubles.Trouble())
     with pytest.raises(SampleError, match=message) as caught:
-        run(doubles.fake_plan(), make, tmp_path / "out", workers=0, resume_command=doubles.RESUME)
+        run(doubles.fake_plan(), make, tmp_path / "out", Settings())
 
     assert caught.value.exit_code == 6
     assert names_in(tmp_path / "out/shards") == {"000000", "000000.json"}
