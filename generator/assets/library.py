@@ -20,7 +20,7 @@ from gen_data.assets.asset_cache import Arrays, DiskCache, Store, content_key
 from gen_data.assets.asset_ids import AssetId, parse_asset_id
 from gen_data.assets.importer import FileRemarks, ImportedMesh
 from gen_data.core import asset_types, colorimetry, plates, scene, se3, serialization
-from gen_data.core.bounded_cache import CountCache
+from gen_data.core.bounded_cache import CountCache, ObjectCache
 from gen_data.core.errors import AssetError, UnknownAsset, did_you_mean
 from gen_data.core.writing import Writing
 
@@ -31,8 +31,10 @@ VEHICLES = frozenset(
 _ENTRIES = 8192
 _SUMMARIES = 4096
 """Kept in memory: about 1 and 5 kB each."""
-_BOUNDS, _WRITING = "bounds 1", "writing 2"
+_BOUNDS, _STRIDE_BOUNDS, _WRITING = "bounds 1", "stride bounds 1", "writing 2"
 """Names of stored bounds and lines of text; they change with their definitions."""
+_checked: ObjectCache[None] = ObjectCache(4096)
+"""Materials whose numbers are finite: many meshes have the same ones."""
 _WRITES = "writing"
 """Fact of families with text: true for textures, a function of an object's arguments."""
 
@@ -188,12 +190,17 @@ class Library:
         pose = dict(self.get(asset_id).attributes).get("pose", "")
         if not pose or pose not in families.declared(asset_id, "moving_poses", ()):
             return self.bounds_m(asset_id)
-        person = parse_asset_id(asset_id)
-        corners = [
-            self.bounds_m(str(AssetId(person.name, {**person.parameters, "phase": k / 4})))
-            for k in range(4)
-        ]
-        low, high = np.min(corners, axis=0)[0].tolist(), np.max(corners, axis=0)[1].tolist()
+
+        def measure() -> Arrays:
+            person = parse_asset_id(asset_id)
+            corners = [
+                self.bounds_m(str(AssetId(person.name, {**person.parameters, "phase": k / 4})))
+                for k in range(4)
+            ]
+            return {"corners_m": np.stack([np.min(corners, axis=0)[0], np.max(corners, axis=0)[1]])}
+
+        # Stored with the person: meshes of other phases are not, since a walk has many.
+        low, high = self.derived(asset_id, _STRIDE_BOUNDS, measure)["corners_m"].tolist()
         return _vec3(low), _vec3(high)
 
     def vertices_m(self, asset_id: str) -> asset_types.Float32:
@@ -421,13 +428,21 @@ def check_finite(asset_id: str, mesh: asset_types.MeshData) -> None:
     """
     for name in ("vertices_m", "normals", "uvs"):
         values = getattr(mesh, name)
-        if not np.isfinite(values).all():
+        # A sum is faster, and not finite if any number is not.
+        with np.errstate(over="ignore", invalid="ignore"):
+            is_finite = bool(np.isfinite(values.sum()))
+        if not is_finite and not np.isfinite(values).all():
             number = int(np.argwhere(~np.isfinite(values))[0, 0])
             raise AssetError(f"asset '{asset_id}': {name}[{number}] is NaN or infinite")
     try:
         # Much faster than looking for a place, and refuses the same numbers.
-        serialization.canonical_json(mesh.materials)
+        _checked.get(mesh.materials, lambda: _require_finite(mesh.materials))
     except ValueError:
         plain = serialization.to_plain(mesh.materials)
         field = serialization.find_not_finite(plain, "materials")
         raise AssetError(f"asset '{asset_id}': {field} is NaN or infinite") from None
+
+
+def _require_finite(materials: tuple[asset_types.Material, ...]) -> None:
+    """Raise ValueError if a number is NaN or infinite."""
+    serialization.canonical_json(materials)

@@ -11,6 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 _FAILED = ctypes.c_void_p(-1).value
 _MADV_DONTNEED = getattr(mmap, "MADV_DONTNEED", 4)
 
@@ -53,7 +55,7 @@ def owned_bytes(*arrays: Any) -> int:
 
 
 def _is_mapped(array: Any) -> bool:
-    while hasattr(array, "base"):
+    while isinstance(array, np.ndarray):
         array = array.base
     return isinstance(array, memoryview) and isinstance(array.obj, ctypes.Array | mmap.mmap)
 

@@ -5,6 +5,7 @@ Perlin, "Improving noise", SIGGRAPH 2002; Worley, "A cellular texture basis func
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -76,6 +77,34 @@ def perlin(cells: Cells, rng: Rng, size_px: int = SIZE_PX) -> Float32:
     return noise
 
 
+def quick_perlin(cells: Cells, rng: Rng, size_px: int = SIZE_PX) -> Float32:
+    """``perlin`` up to rounding, in a third of the time: for images that are made in each scene."""
+    down, across = cells
+    angle = (2.0 * math.pi * uniform((down, across), rng)).astype(np.float32)
+    gy, gx = np.sin(angle), np.cos(angle)
+    iy, fy = _lattice(down, size_px)
+    ix, fx = _lattice(across, size_px)
+    sy, sx = _fade(fy), _fade(fx)
+    # Below a row of the lattice, noise is linear: a slope and an offset for each column.
+    left, right = ix, (ix + 1) % across
+    slope = gy.take(left, axis=1) * (1 - sx) + gy.take(right, axis=1) * sx
+    offset = gx.take(left, axis=1) * (fx * (1 - sx)) + gx.take(right, axis=1) * ((fx - 1) * sx)
+    above, below = iy, (iy + 1) % down
+    parts = (
+        (slope, above, fy * (1 - sy)),
+        (offset, above, 1 - sy),
+        (slope, below, (fy - 1) * sy),
+        (offset, below, sy),
+    )
+    noise = np.zeros((size_px, size_px), np.float32)
+    for strip in (slice(k, k + _STRIP_PX) for k in range(0, size_px, _STRIP_PX)):
+        for table, row, share in parts:
+            part = table.take(row[strip], axis=0)
+            part *= np.float32(1.6) * share[strip, None]
+            noise[strip] += part
+    return noise
+
+
 def _ramp_along(gy: Float32, ramp_x: Float32, row: NDArray[np.int64], away_y: Float32) -> Float32:
     ramp: Float32 = gy.take(row, axis=0)
     ramp *= away_y
@@ -91,15 +120,22 @@ def _mix(first: Float32, second: Float32, share: Float32) -> Float32:
     return first
 
 
-def fbm(cells: Cells, octaves: int, rng: Rng, gain: float = 0.5, size_px: int = SIZE_PX) -> Float32:
-    """Perlin octaves of doubling frequency, in about [-1, 1]."""
+def fbm(
+    cells: Cells,
+    octaves: int,
+    rng: Rng,
+    gain: float = 0.5,
+    size_px: int = SIZE_PX,
+    octave: Callable[[Cells, Rng, int], Float32] = perlin,
+) -> Float32:
+    """Perlin octaves of doubling frequency, in about [-1, 1], made by ``octave``."""
     total = np.zeros((size_px, size_px), dtype=np.float32)
     weight, weights = 1.0, 0.0
     down, across = cells
     for _ in range(octaves):
         if max(down, across) > size_px:
             break
-        total += np.float32(weight) * perlin((down, across), rng, size_px)
+        total += np.float32(weight) * octave((down, across), rng, size_px)
         weights += weight
         weight, down, across = weight * gain, 2 * down, 2 * across
     noise: Float32 = total / np.float32(math.sqrt(weights))

@@ -95,11 +95,11 @@ def _seen_from_below(
 
 def _heaps(rng: streams.Rng) -> Float32:
     """Density of clouds: large masses with billows on them, in about [-1, 1]."""
-    masses = noise.fbm((3, 3), _OCTAVES, rng, 0.52, _TILE_PX)
+    masses = noise.fbm((3, 3), _OCTAVES, rng, 0.52, _TILE_PX, noise.quick_perlin)
     billows = np.zeros_like(masses)
     for k, cells in enumerate((12, 24, 48)):
-        bumps = 1.0 - 2.0 * np.abs(noise.perlin((cells, cells), rng, _TILE_PX))
-        billows += np.float32(0.5**k) * bumps.astype(np.float32)
+        bumps = 1.0 - 2.0 * np.abs(noise.quick_perlin((cells, cells), rng, _TILE_PX))
+        billows += np.float32(0.5**k) * bumps
     heaps: Float32 = masses + np.float32(0.22) * billows
     return heaps
 

@@ -156,6 +156,22 @@ def test_derived_arrays_are_stored_by_asset_and_name(tmp_path: Path) -> None:
     assert derive("mug?seed=1", "tree 1") == [0, 1, 2]
 
 
+def test_bounds_of_a_stride_are_stored_with_the_person(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, person = open_library(cache_dir=tmp_path), "simple_person?pose=walk&seed=3"
+    corners = [first.mesh(f"{person}&phase={k / 4}").bounds_m() for k in range(4)]
+    expected = (
+        tuple(map(min, *(low for low, _ in corners))),
+        tuple(map(max, *(high for _, high in corners))),
+    )
+    assert first.stride_bounds_m(person) == expected
+
+    later = open_library(cache_dir=tmp_path)
+    monkeypatch.delattr(type(later), "_imported")
+    assert later.stride_bounds_m(person) == expected
+
+
 def test_people_in_a_given_pose_are_stored_but_not_every_step_of_a_stride(tmp_path: Path) -> None:
     """Poses are few; a walk through a sequence takes hundreds of steps."""
     library = open_library(cache_dir=tmp_path)

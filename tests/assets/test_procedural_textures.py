@@ -12,7 +12,7 @@ from gen_data import content
 from gen_data.content.procedural import TEXTURES
 from gen_data.content.procedural.packaging import can_size
 from gen_data.core.asset_types import TextureData
-from gen_data.core.noise import fbm, perlin, worley
+from gen_data.core.noise import fbm, perlin, quick_perlin, worley
 from gen_data.core.streams import Streams
 from tests.tiers import sampled
 
@@ -138,6 +138,16 @@ def test_brand_of_a_can_is_on_its_upper_front() -> None:
         brand, gap = strokes[30:110, 180:332], strokes[30:110, 138:146]
         assert brand.mean() > 0.01 > gap.mean()
         assert can_size(seed).radius_m < 0.05
+
+
+@pytest.mark.parametrize("cells", [(2, 3), (3, 5), (192, 96)])
+def test_quick_noise_is_gradient_noise_up_to_rounding(cells: tuple[int, int]) -> None:
+    quick, slow = (
+        make(cells, Streams(seed=1, scene=0).rng("test"), 512) for make in (quick_perlin, perlin)
+    )
+
+    assert np.abs(slow).max() > 0.4
+    np.testing.assert_allclose(quick, slow, atol=2e-6)
 
 
 def test_noise_is_zero_at_lattice_points_repeats_and_has_true_distances() -> None:
