@@ -63,7 +63,7 @@ TEXTS_KEPT = 4
 ENGINES_KEPT = 2
 """Renderers and physics engines of the latest settings: some tens of megabytes of assets each."""
 SCENES_KEPT = 12
-"""Number of packed scenes: one grid of 24 for each of two processes."""
+"""Number of packed scenes: of a grid of 24, each of two processes renders 12."""
 SAMPLES_KEPT = 32
 """Latest small samples, on which other labels are drawn without rendering."""
 DRAWS_MAX = 300
