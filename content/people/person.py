@@ -443,7 +443,7 @@ def _drawn_action(seed: int, age_group: AgeGroup, pose: str, phase: float) -> tu
     drawn = rng.choose(_pose_lots(age_group))
     step = rng.choose(range(PHASES))
     if not math.isfinite(phase):
-        raise ValueError("phase is no number")
+        raise ValueError("phase is not a number")
     if phase >= 0.0:
         step = round(phase * PHASES) % PHASES
     return pose or drawn, step

@@ -283,7 +283,7 @@ class ControlsPanel:
         found = controls.find_distribution(config, section, name, field)
         values = controls.three_values(control, found)
         if base is None or values is None:
-            ui.notify("there is no picture to vary yet, or the field is no number")
+            ui.notify("there is no picture to vary yet, or the field is not a number")
             return
         place = "" if section == controls.GENERAL else section
         self._tab.vary(vary(base, place, name, field, values))

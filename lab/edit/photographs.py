@@ -28,14 +28,14 @@ assets: {{folders: [{folder}]}}
 elements:
   - {{type: plate, name: plate, photos: [{photo}]}}
   - type: objects
-    name: things
+    name: clutter
     on: plate
     count: 4
     placement: scatter
     assets: {{ids: [mug, banana, apple, bowl]}}
 randomizers:
   - {{type: plate, name: plate, photos: [{photo}]}}
-  - {{type: objects, name: things, count: {{uniform_integer: [2, 6]}}}}
+  - {{type: objects, name: clutter, count: {{uniform_integer: [2, 6]}}}}
 sensors:
   - {{type: plate_camera, name: color, size_px: [{width}, {height}]}}
 annotations: [boxes2d, instance_masks, visibility]

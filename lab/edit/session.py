@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.workers import Ticket
 
 BEGIN = (
-    "Nothing is here yet. Begin with a shipped configuration, whose name completes what you type "
-    "behind 'extends: ', or drop a photograph on 'Own files'."
+    "The file is empty. Begin with a shipped configuration, whose name is completed after "
+    "'extends: ', or drop a photograph on 'Own files'."
 )
 BEGINNINGS = ("tabletop.yaml", "rooms.yaml", "street.yaml", "photo_plates.yaml")
 """Configurations offered for an empty file."""

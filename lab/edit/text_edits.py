@@ -197,4 +197,4 @@ def _plain(key: str | int) -> str:
 
 def _refuse(path: Path) -> NoReturn:
     field = ".".join(map(str, path))
-    raise ConfigError(f"{field}: has no place of its own in the file; edit its text instead")
+    raise ConfigError(f"{field}: has no separate place in the file; edit its text instead")
