@@ -9,7 +9,7 @@ from gen_data.assets.family import Family
 from gen_data.assets.library import Library, open_library
 
 VARIANTS = 4
-"""Variants made per family: ranges hardly depend on further ones, and all would take minutes."""
+"""Variants made per family: further ones barely change ranges, and all would take minutes."""
 
 
 def family_page() -> str:

@@ -111,7 +111,7 @@ def _template_files() -> list[Path]:
 
 
 def own_names(table: PluginTable[Any]) -> list[str]:
-    """Names of our own plug-ins, sorted; those of installed packages are left out."""
+    """Names of built-in plug-ins, sorted, without plug-ins of installed packages."""
     return sorted(table.entries)
 
 
@@ -280,7 +280,7 @@ def _reflow(text: str) -> str:
 
 
 def _prose(text: str) -> str:
-    """Text of a docstring as Markdown; outside of code, ``<`` is no tag."""
+    """Text of a docstring as Markdown; outside code, ``<`` does not begin a tag."""
     parts = text.replace("``", "`").split("`")
     parts[::2] = [part.replace("<", "&lt;") for part in parts[::2]]
     return "`".join(parts)
