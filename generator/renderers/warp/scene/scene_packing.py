@@ -117,7 +117,7 @@ def repack_moved(
 ) -> PackedWorld:
     """Pack another instant of a packed scene: the same assets and materials at other poses.
 
-    Poses of bodies, lights and camera may differ from those of ``world``.
+    Poses of bodies, lights and camera may differ from the poses in ``world``.
     """
     _, *assets = world.keep
     meshes = assets[0]

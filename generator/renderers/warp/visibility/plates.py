@@ -165,7 +165,7 @@ def is_hidden(
 
 
 def _kinds(frame: CameraView) -> wp.array:
-    """Kind of each body with respect to the photograph, by number; the first is no body."""
+    """Kind of each body with respect to the photograph, by number; the first means no body."""
     bodies = frame.state.scene.bodies
     kinds = [kernels.GROUND if plates.is_catcher(body) else kernels.THING for body in bodies]
     values = np.array([kernels.EMPTY, *kinds], np.int32)
