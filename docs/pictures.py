@@ -105,7 +105,7 @@ class Sheet(Strict):
         seed: In place of the configuration's own.
         labels: Whether to draw the labels.
         tile_px: Width of a picture.
-        channels: Channels to show; ``written`` = those of every sensor.
+        channels: Channels to show; ``written`` = the channels of every sensor.
         quality: Quality of the file.
         set_too: Values by path.
     """

@@ -233,7 +233,7 @@ WITHOUT_READER = {
     "culane": "its evaluation is in no registry: benchmarks.readers.evaluations",
     "lidar_flow": "judged by av2 and FlowNet3D: benchmarks.readers.evaluations",
     "map_vectors": "its evaluation is in no registry: benchmarks.readers.evaluations",
-    "opendrive": "our reader; ASAM's checker requires packages of its own (docs/maps.md)",
+    "opendrive": "our reader; ASAM's checker requires separate packages (docs/maps.md)",
     "openlane": "its evaluation is in no registry: benchmarks.readers.evaluations",
     "scene_text": "its evaluations are in no registry: benchmarks.readers.evaluations",
 }

@@ -17,8 +17,8 @@ def family_page() -> str:
     library = open_library()
     lines = [
         "# Families of assets",
-        "An asset id may ask for any parameter of its family: `desk?seed=3&width_m=1.6`"
-        " ([assets](../assets.md#sizes-and-choices)). Ranges are those of the first"
+        "An asset id may set any parameter of its family: `desk?seed=3&width_m=1.6`"
+        " ([assets](../assets.md#sizes-and-choices)). Ranges are taken over the first"
         f" {VARIANTS} variants; a variant whose other draws leave less room refuses more, and"
         " `gen-data describe FAMILY` prints the same texts.",
     ]
