@@ -1,9 +1,9 @@
 """Bytes between host and device, and waits: ``python -m benchmarks.bench_device_traffic``.
 
-Counts, frame by frame, what would cross on a GPU, by the function that asks for it; needs none. On
-the CPU device, where host and device are one memory, every array that is read or made from host
-data is counted as if it crossed. Visibility is found by rays, as on a GPU. Arguments of kernels
-(less than 1 kB each) are not counted.
+Counts the transfers of a GPU frame by frame, by calling function; requires no GPU. On the CPU
+device, where host and device share one memory, every array that is read by the host or made from
+host data is counted as a transfer. Visibility is found by rays, as on a GPU. Kernel arguments (less
+than 1 kB each) are not counted.
 """
 
 import argparse
@@ -66,7 +66,7 @@ class Traffic:
 
 
 def _caller() -> str:
-    """Module and function of the renderer that asks for a transfer."""
+    """Module and function of the renderer that requests a transfer."""
     frame: Any = sys._getframe(2)
     while frame is not None:
         module, function = frame.f_globals.get("__name__", ""), frame.f_code.co_name
@@ -178,8 +178,8 @@ class CountingRenderer:
     """A renderer that counts the transfers of every reading.
 
     Attributes:
-        frames: What was counted.
-        label: Beginning of the names of the next frames.
+        frames: Counts by frame.
+        label: Prefix of the names of the next frames.
     """
 
     def __init__(self, renderer: Renderer) -> None:
@@ -209,7 +209,7 @@ class CountingRenderer:
 
 
 def _hit_bytes(hits: LidarHits) -> int:
-    """Bytes of what rays hit: three floats per ray, and the numbers of body and material."""
+    """Bytes of the hits of rays: three floats per ray, and the numbers of body and material."""
     behind = 0 if hits.detours is None else len(hits.detours.ray)
     return int(hits.range_m.size * (3 * 4 + 2 * 4) + behind * (2 * 4 + 2 * 4))
 
@@ -222,7 +222,7 @@ def count_frames(config: str, samples: int, *overrides: str) -> list[Frame]:
         assert isinstance(checked, CheckedRenderer)
         renderer = checked.renderer
         assert isinstance(renderer, WarpRenderer)
-        # A GPU has memory of its own.
+        # A GPU has separate memory.
         renderer._cache.shares_memory = False
         counting = CountingRenderer(renderer)
         pipeline.__dict__["renderer"] = counting

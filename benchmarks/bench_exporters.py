@@ -1,9 +1,9 @@
 """CPU time of exporters: ``python -m benchmarks.bench_exporters FOLDER [FORMAT ...]``.
 
 FOLDER is a finished data set. Prints CPU milliseconds per sample of ``write_shard`` and of
-``finalize`` for each format alone: those of the list, or all that the data set can be exported
-in. Formats with options are written as YAML, such as ``'{type: voc, images: png}'``. Samples are
-read before the measurement, and each format is measured ``--repeat`` times; the least counts.
+``finalize`` for each format alone: the listed ones, or all formats to which the data set can be
+exported. Formats with options are written as YAML, such as ``'{type: voc, images: png}'``. Samples
+are read before the measurement, and each format is measured ``--repeat`` times; the minimum counts.
 """
 
 import argparse

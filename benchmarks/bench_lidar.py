@@ -2,9 +2,8 @@
 
 An HDL-64E, 133,312 pulses, in samples of ``kitti_rig.yaml``, from directions to records with
 position, intensity, time, ring, labels and returns. One process, one core; the best of several
-sweeps, each in a scene of its own, as in a sequence: the scene is packed and traced anew, its
-assets are cached. "Moving" is the same street with the scanner and all vehicles and people in
-motion.
+sweeps, each in a new scene, as in a sequence: the scene is packed and traced again, its assets are
+cached. "Moving" is the same street with the scanner and all vehicles and people in motion.
 """
 
 import argparse

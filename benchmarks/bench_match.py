@@ -1,9 +1,9 @@
 """Recovery of known parameters: ``python -m benchmarks.bench_match [--repeats 6] [--spread 0.4]``.
 
-Photographs and scans of scenes without a renderer (those of the tests) are made with known values,
-and fitted from other scenes of the same kind. Prints, for each quantity, the true value, mean and
-standard deviation of the fits over repetitions with new scenes, and how many 95 % intervals hold
-the truth.
+Photographs and scans of scenes without a renderer (from the tests) are made with known values, and
+fitted from other scenes of the same kind. Prints, for each quantity, the true value, mean and
+standard deviation of the fits over repetitions with new scenes, and how many 95 % intervals contain
+the true value.
 """
 
 import argparse

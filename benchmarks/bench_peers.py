@@ -4,10 +4,11 @@
 ``--workload fine``: objects of 12,000 triangles, a new scene in each view; ``small``: small meshes
 and primitives, five views per scene. All renderers draw the same scenes (meshes, poses, cameras,
 lamps), take turns round by round, and have a process each, pinned to one core. Figures are CPU
-seconds of that process, of all threads and with system time. Masks are compared with ours, so that
-everybody really draws the scenes. Settings of the others: see the modules of ``benchmarks/peers``.
+seconds of that process, of all threads and with system time. Masks are compared with this
+renderer's, which proves that every peer draws the scenes. Settings of the peers: see the modules of
+``benchmarks/peers``.
 
-bpy and pyrender need an older NumPy than this project. They run in an environment of their own:
+bpy and pyrender need an older NumPy than this project. They run in a separate environment:
 
     python3.11 -m venv peers
     peers/bin/pip install bpy pyrender OpenEXR opencv-python-headless
@@ -69,7 +70,7 @@ class Figures:
 
 
 class Renderer:
-    """A renderer in a process of its own."""
+    """A renderer in a separate process."""
 
     def __init__(self, name: str, folder: Path, interpreter: str, core: int) -> None:
         self.name = name

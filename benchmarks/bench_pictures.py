@@ -1,13 +1,13 @@
-"""Cars and people in pictures beside those of real drives: ``python -m benchmarks.bench_pictures``.
+"""Cars and people in rendered and real pictures: ``python -m benchmarks.bench_pictures``.
 
 Pictures come from the first step of every view of a configuration, or (``--kitti FOLDER``) from
 ``label_2`` of KITTI's object format. Objects are the rows of KITTI's labels: image boxes around the
 projected 3D box, ``DontCare`` left out. Heights are in pixels of KITTI's camera (focal length
 721.5 px): pictures of our cameras are rendered small, since labels need few pixels. ``--light``
 adds grey levels: pictures with people are rendered again at full size. Real labels have no
-silhouettes, so real figures are of the boxes.
+silhouettes, so real figures refer to boxes.
 
-The column ``real`` is of ``street_figures.yaml``.
+The column ``real`` is read from ``street_figures.yaml``.
 """
 
 import argparse
@@ -69,12 +69,12 @@ class Labelled:
 
     @classmethod
     def of(cls, row: str, focal_px: float, middle_px: float) -> "Labelled | None":
-        """The object of a row; None for other kinds, and above or below the rows of KITTI.
+        """The object of a row; None for other kinds, and outside the image rows of KITTI.
 
         Args:
             row: Line of a label file.
             focal_px: Focal length.
-            middle_px: Image row in the middle of those that KITTI would have.
+            middle_px: Image row in the middle of the rows that KITTI would have.
         """
         kind, truncation, _, _, left, top, right, bottom, h, w, length, x, y, z, _ = row.split()
         if kind not in KINDS:
@@ -109,7 +109,7 @@ class Grey:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Objects of a picture, and the pixels in the boxes of people, and those that show people."""
+    """Objects of a picture, the pixels in the boxes of people, and the pixels that show people."""
 
     objects: tuple[Labelled, ...]
     boxes: Grey = Grey()

@@ -1,25 +1,26 @@
-"""Figures of laser scans beside those of real ones: ``python -m benchmarks.bench_scans --n 12``.
+"""Figures of simulated and real laser scans: ``python -m benchmarks.bench_scans --n 12``.
 
 Scans come from the first and the last step of a configuration's scenes, or (``--kitti FOLDER``)
 from the folders ``velodyne``, ``label_2`` and ``calib`` of KITTI's object format: real frames, or
-the ``kitti/training`` of a finished data set. The table's first column is of KITTI's scanner, an
-HDL-64E S2. Definitions, the same for all sources:
+the ``kitti/training`` of a finished data set. The table's first column refers to KITTI's scanner,
+an HDL-64E S2. Definitions, the same for all sources:
 
 * **cells**: 64 x 512 cells of the field between +3 and -25 degrees of elevation and 45 degrees to
   both sides of ahead, as in range images of this scanner (Wu et al., "SqueezeSeg", ICRA 2018); the
   share that contains a point.
 * **ground**: points 4 to 20 m away, in patches of 4 m x 4 m that hold at least 30 points, all below
   1.2 m under the scanner's origin and within 0.1 m of the patch's own plane. The residual is the
-  distance to that plane, kerbs included. Reflectance is that of the same points.
+  distance to that plane, kerbs included. Reflectance refers to the same points.
 * **objects**: points in an annotated box whose lowest 0.2 m are left out, as they contain ground;
   boxes ahead, within 40 degrees and 5 to 50 m, of whose directions at most a fifth of the returns
   end in front of the box. Numbers of points at 10, 20 and 40 m: a straight line through log(points)
   over log(range), with its standard error there. The column ``own`` counts the points of the
-  object itself instead of those in its box, below 0.2 m too, and is known for our scans only.
+  object itself instead of the points in its box, including those below 0.2 m; it exists for
+  simulated scans only.
 
-  The line is no count. KITTI's 546 on a cyclist at 10 m is more than the beams that touch any of
-  ours there: 378 from behind, 512 from the side. Of people far away, KITTI labels those that its
-  annotators recognised; ours count from one point on.
+  The line is not a count. KITTI's 546 on a cyclist at 10 m exceeds the number of beams that hit any
+  simulated cyclist there: 378 from behind, 512 from the side. KITTI labels distant people only if
+  its annotators recognised them; simulated people count from one point on.
 * **highest beam**: the 99.5th percentile of elevations, about the scanner's origin in the axes of
   the car.
 """
@@ -64,7 +65,7 @@ class Directions:
 
     @classmethod
     def of(cls, p_m: Float64) -> "Directions":
-        """Those of points [n, 3]."""
+        """Elevations and azimuths of points [n, 3]."""
         level_m = np.hypot(p_m[:, 0], p_m[:, 1])
         return cls(
             np.degrees(np.arctan2(p_m[:, 1], p_m[:, 0])),
@@ -77,7 +78,7 @@ class Directions:
 class ObjectBox:
     """An annotated box: pose ``R``, ``t_m`` in the scanner's frame, ``size_m`` along its axes.
 
-    ``instance_id`` is that of its object's points; 0 = unknown.
+    ``instance_id`` is the id of its object's points; 0 = unknown.
     """
 
     kind: str

@@ -1,10 +1,11 @@
 """Experiments with known answers: ``python -m benchmarks.bench_study {ranking,weakness} [--out]``.
 
-``ranking``: a harmful, a useless and a helpful randomizer, which ``gen-data study`` has to tell
-apart on pictures of another renderer tier, lens and light. ``weakness``: a configuration that
-rarely draws what half of the pictures show; ``gen-data adapt`` has to find it, and its next round
-has to raise average precision there. Both print their tables, whether the answer is right, and CPU
-seconds of all processes. An interrupted experiment in ``--out`` goes on.
+``ranking``: a harmful, a useless and a helpful randomizer, which ``gen-data study`` has to
+    distinguish on pictures of another renderer tier, lens and light. ``weakness``: a configuration
+    that rarely draws an exposure found in half of the pictures; ``gen-data adapt`` has to detect
+    this, and its next round has to raise average precision there. Both print their tables, whether
+    the answer is right, and CPU seconds of all processes. An interrupted experiment in ``--out``
+    continues.
 """
 
 import argparse
@@ -23,15 +24,15 @@ from gen_data.lab.study.study import run_study
 CONFIGS = Path(__file__).with_name("studies")
 """Folder of the configurations."""
 JUDGED_SEED = 900
-"""Seed of the data that tell what a detector misses; it trains on others."""
+"""Seed of the data on which misses of a detector are measured; it trains on others."""
 
 
 def run_ranking(out: Path, sizes: Mapping[str, int]) -> bool:
     """Compare the configuration with three others that each lack one randomizer.
 
     Returns:
-        Whether the study finds the removal of the harmful one better, that of the helpful one
-        worse, and no difference without the useless one.
+        Whether the study finds an improvement without the harmful one, a deterioration without the
+        helpful one, and no difference without the useless one.
     """
     config = str(CONFIGS / "ranking.yaml")
     answers = {"wide": "better", "weights": "no difference found", "orbit": "worse"}
@@ -45,7 +46,7 @@ def run_ranking(out: Path, sizes: Mapping[str, int]) -> bool:
 
 
 def run_weakness(out: Path, sizes: Mapping[str, int]) -> bool:
-    """Adapt to what a detector misses, and compare the next round with the configuration.
+    """Adapt to misses of a detector, and compare the next round with the configuration.
 
     Returns:
         Whether the exposure is re-weighted, twice with the same bytes and equal data sets,

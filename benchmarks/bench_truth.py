@@ -1,8 +1,8 @@
-"""CPU time of truth that is made on request, and its bounds: ``python -m benchmarks.bench_truth``.
+"""CPU time of truth on request, and its bounds: ``python -m benchmarks.bench_truth``.
 
 A row per kind: median and maximum over scenes, in milliseconds per image or frame, or relative to
-``depth`` alone. What is done once per scene is shared by its 20 frames. One process; scenes are
-made twice, and the first time, which fills caches, does not count. Names of kinds choose rows.
+``depth`` alone. Costs per scene are distributed over its 20 frames. One process; scenes are made
+twice, and the first time, which fills caches, does not count. Names of kinds choose rows.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def lanes_ms(pipeline: Pipeline, samples: Sequence[Sample]) -> float:
 
 
 def exporter_ms(name: str, pipeline: Pipeline, samples: Sequence[Sample]) -> float:
-    """What an exporter does for a shard with all frames of a scene, per frame."""
+    """Cost of an exporter for a shard with all frames of a scene, per frame."""
     exporter, parts = pipeline.exporters[name], [drop_pixels(sample) for sample in samples]
     with tempfile.TemporaryDirectory() as folder:
         shards = (Path(folder) / str(number) for number in range(STEPS))
@@ -108,7 +108,7 @@ def nuscenes(scene: Scene, assets: AssetLibrary) -> object:
 
 
 def occupancy_ms(kind: str, pipeline: Pipeline, samples: Sequence[Sample]) -> float:
-    """The default grid of a street, or what one camera or one scan adds, per frame."""
+    """Cost of the default grid of a street, or the addition of one camera or scan, per frame."""
     sample = samples[0]
     scenes = {"": sample.scene, **sample.instants}
 

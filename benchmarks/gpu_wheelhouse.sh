@@ -52,7 +52,7 @@ rm -f "$folder"/part.*
 tar c -C "$staging" tree wheels assets | gzip -6 | split -b 30M -d -a 2 - "$folder/part."
 cat > "$folder/join.sh" <<'BASH'
 #!/usr/bin/env bash
-# Join the parts beside this script, and install them into a folder: bash join.sh TARGET
+# Join the parts next to this script, and install them into a folder: bash join.sh TARGET
 set -euo pipefail
 mkdir -p "$1" && target=$(cd "$1" && pwd)
 cat "$(dirname "$0")"/part.* | tar xz -C "$target"

@@ -15,8 +15,8 @@ class RealFigures:
     """Real figures of pictures or of scans.
 
     Attributes:
-        asked: Largest relative deviation of ours.
-        least: Deviation that is in range whatever the figure [its unit].
+        asked: Largest relative deviation of simulated figures.
+        least: Absolute deviation that is always in range [its unit].
         rows: Figures by name; NaN = unknown.
     """
 

@@ -1,11 +1,11 @@
 """Samples per second by number of workers: ``python -m benchmarks.scaling tabletop``.
 
 Measures stages of samples at full size, and merging and verification of ``--merged`` samples with
-small images, in one process. Then it simulates runs of ``--samples`` with 1 to 1,000 workers: each
+small images, in one process. It then simulates runs of ``--samples`` with 1 to 1,000 workers: each
 makes a shard, stores it, reports it to the driver, and gets the next one. Storage and driver serve
 one shard at a time, in the order of their arrival. Merging follows the last shard, on one core.
 
-The table names what limits each run: the part that works for the largest share of its time.
+The table names the bottleneck of each run: the part that works for the largest share of its time.
 """
 
 import argparse
@@ -35,14 +35,14 @@ class Costs:
     """Costs of a data set.
 
     Attributes:
-        plan_s: Before the first worker starts.
-        start_s: Of a worker, until its first sample.
-        sample_s: Of a worker, per sample.
+        plan_s: Time before the first worker starts.
+        start_s: Time of a worker until its first sample.
+        sample_s: Time of a worker per sample.
         shard_size: Samples per shard.
-        sample_bytes: Stored per sample.
-        driver_s: Of the supervisor, per shard.
-        merge_s: After the last shard, per sample.
-        verify_s: Of ``gen-data verify``, per sample; not part of a run.
+        sample_bytes: Stored bytes per sample.
+        driver_s: Time of the supervisor per shard.
+        merge_s: Time after the last shard, per sample.
+        verify_s: Time of ``gen-data verify`` per sample; not part of a run.
     """
 
     plan_s: float
@@ -80,10 +80,10 @@ def simulate(costs: Costs, samples: int, workers: int, bytes_per_s: float) -> Fo
     """Simulate a run on a virtual clock.
 
     Args:
-        costs: Of the data set.
-        samples: A multiple of the shard size.
-        workers: Processes, each with a core.
-        bytes_per_s: What the storage takes, from all workers together.
+        costs: Costs of the data set.
+        samples: Number of samples, a multiple of the shard size.
+        workers: Number of processes, each with a core.
+        bytes_per_s: Throughput of the storage for all workers together.
     """
     shards = samples // costs.shard_size
     make_s = costs.shard_size * costs.sample_s
@@ -115,7 +115,7 @@ def simulate(costs: Costs, samples: int, workers: int, bytes_per_s: float) -> Fo
 
 
 def measure_costs(name: str, n: int, merged: int) -> tuple[Costs, dict[str, float]]:
-    """Costs of a shipped configuration on this machine, in CPU seconds; those of each stage."""
+    """Costs of a shipped configuration on this machine, and of each stage, in CPU seconds."""
     full, stages = _measure(name, n, ())
     small, _ = _measure(name, merged, (f"sensors.color.size_px={SMALL_PX}",))
     return replace(full, merge_s=small.merge_s, verify_s=small.verify_s), stages

@@ -1,11 +1,11 @@
 """Draw the pictures of the reference and of the gallery from docs/pictures.yaml.
 
     python docs/pictures.py                          # all; PICTURES_PROCESSES=2
-    python docs/pictures.py randomizer/lighting      # those of one plug-in
+    python docs/pictures.py randomizer/lighting      # one plug-in
     python docs/pictures.py configuration            # the gallery
     python docs/pictures.py ladder                   # ladders of the gallery
     python docs/pictures.py tutorial                 # results of the tutorials
-    python docs/pictures.py --missing                # those without a file
+    python docs/pictures.py --missing                # pictures without a file
 
 A strip shows one scene three times, with a low, a middle and a high value of one field. Strips of
 distributions are histograms of drawn values.
@@ -98,15 +98,15 @@ class Sheet(Strict):
     """Samples of a shipped configuration, or of the configuration of a tutorial.
 
     Attributes:
-        config: Name of the configuration; empty = that of the sheet.
-        until: Text of the first block of a tutorial that is not carried out before drawing.
+        config: Name of the configuration; empty = name of the sheet.
+        until: Text of the first block of a tutorial that is not executed before drawing.
         samples: Numbers of the samples.
         columns: Pictures in a row.
         seed: In place of the configuration's own.
         labels: Whether to draw the labels.
         tile_px: Width of a picture.
-        channels: Channels to show; ``written`` = those of every sensor.
-        quality: Of the file.
+        channels: Channels to show; ``written`` = the channels of every sensor.
+        quality: Quality of the file.
         set_too: Values by path.
     """
 
@@ -195,7 +195,7 @@ def read_sheets(kind: str = CONFIGURATION) -> Mapping[str, Sheet]:
 
 
 def find_jobs(words: Sequence[str] = ()) -> Iterator[Job]:
-    """Files to draw: all, or those of some kinds or plug-ins (``kind/name``)."""
+    """Files to draw: all, or the files of some kinds or plug-ins (``kind/name``)."""
     jobs = [Job(row.kind, row.name, strip) for row in read_rows() for strip in row.strips]
     jobs += [Job(LADDER, name, strip) for name, strip in read_ladders().items()]
     for kind in (CONFIGURATION, TUTORIAL):

@@ -30,7 +30,7 @@ class SampleDataset(Dataset[Any]):
 
     Args:
         samples: A ``Dataset`` with ``n``, or a finished one.
-        target: Function from a Sample to arrays, such as those of ``gen_data.targets``.
+        target: Function from a Sample to arrays, such as one of ``gen_data.targets``.
         transform: Called with the tensors.
 
     Warns:
@@ -57,7 +57,7 @@ class SampleDataset(Dataset[Any]):
 
 
 class SampleStream(IterableDataset[Any]):
-    """Iterable data set over a Loader, which has workers of its own.
+    """Iterable data set over a Loader, which has its own workers.
 
     Give it to a ``DataLoader`` with ``batch_size=None`` and ``num_workers=0``, or iterate over it.
     ``state_dict`` and ``load_state_dict`` resume in the middle of an epoch.
@@ -87,7 +87,7 @@ class SampleStream(IterableDataset[Any]):
 def loader(
     samples: SampleSequence, target: Target = detection_target, **options: Any
 ) -> SampleStream:
-    """Batches of tensors, epoch after epoch; ``options`` are those of ``gen_data.Loader``."""
+    """Batches of tensors, epoch after epoch; ``options`` as for ``gen_data.Loader``."""
     return SampleStream(Loader(samples, target, **options))
 
 

@@ -33,7 +33,7 @@ def bit_flips(scale: results.Scale, folder: Path) -> results.Result:
 
 
 def _judge(out: Path, path: str, bit: int, digest: str) -> tuple[bool, str]:
-    """Whether a damaged file is named and restored, and what is wrong else."""
+    """Whether a damaged file is named and restored, and a description of any other fault."""
     found = find_deviations(out, full=True)
     named = any(finding.path in (path, "SHA256SUMS", "manifest.json") for finding in found)
     try:

@@ -44,7 +44,7 @@ class Call:
 
 
 def fork_run(out: Path, message: Path, *, stopped: bool = False, **options: float) -> int:
-    """Start a child that makes the data set in ``out``, in a process group of its own.
+    """Start a child that makes the data set in ``out``, in a separate process group.
 
     Args:
         out: Folder of the data set.

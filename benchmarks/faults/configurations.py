@@ -119,8 +119,8 @@ def _try_all(scale: Scale, folder: Path, mutate: Callable[[random.Random], bytes
 def _try(
     folder: Path, mutate: Callable[[random.Random], bytes], seed: int
 ) -> tuple[str, str, float, int]:
-    """How reading a mutant ends, what is wrong with that, CPU seconds, memory that it took [MB]."""
-    # Beside the shipped files, paths in them would have another meaning.
+    """Outcome of reading a mutant, its fault if any, CPU seconds, and memory used [MB]."""
+    # In the folder of the shipped files, paths in them would have another meaning.
     path = folder / f"mutant-{os.getpid()}.yaml"
     path.write_bytes(mutate(random.Random(seed)))
     inherited_mb = _first_peak_mb(os.getpid())
@@ -138,7 +138,7 @@ def _peak_mb() -> int:
 
 @cache
 def _first_peak_mb(process: int) -> int:
-    """Peak memory when this process first asks: what it has from the one it was forked from."""
+    """Peak memory at the first call in this process: the memory inherited from its parent."""
     del process
     return _peak_mb()
 

@@ -227,7 +227,7 @@ HANG_S = 120.0
 
 
 def _kill_after(out: Path, instant_s: float, target: str, digest: str) -> tuple[bool, str]:
-    """Whether something was killed, and what is wrong afterwards."""
+    """Whether a process was killed, and the fault afterwards if any."""
     message = out.with_name(f"{out.name}.message")
     pid = children.fork_run(out, message, workers=2, delay_s=0.2)
     time.sleep(instant_s)

@@ -55,7 +55,7 @@ def objects(scale: Scale, folder: Path) -> Result:
 
 
 def _repeat(place: object_store.ObjectFolder, copy: Path, digest: str) -> str:
-    """Give the command again; what is wrong, or nothing."""
+    """Run the command again; the fault, or nothing."""
     try:
         record().make(URL)
     except GenDataError as error:
@@ -80,7 +80,7 @@ def foreign(scale: Scale, folder: Path) -> Result:
     assert first is not None
     for name in result.until_end(scale, NAMES):
         file = shard_record.FileRecord("name", 1, hashlib.sha256(b"x").hexdigest())
-        # Past the check of its own constructor, as somebody else writes it.
+        # Bypasses the check of its constructor, as foreign code might.
         object.__setattr__(file, "path", name)
         data = replace(first, files=(*first.files, file)).to_bytes()
         result.add(_is_refused(data), f"record with {name!r}")
@@ -184,7 +184,7 @@ def caches(scale: Scale, folder: Path) -> Result:
 
 
 def _use(cache: Path, number: int, can_write_elsewhere: bool) -> str:
-    """Use a cache that refuses every write; what is wrong, or nothing."""
+    """Use a cache that refuses every write; the fault, or nothing."""
     before = sorted(cache.rglob("*"))
 
     def fill(chosen: Path) -> None:

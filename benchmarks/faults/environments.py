@@ -15,15 +15,15 @@ N = 4
 
 @dataclass(frozen=True)
 class Environment:
-    """How a command is started.
+    """Environment in which a command is started.
 
     Attributes:
         variables: Environment variables; None = unset.
-        cwd, out: Folders; ``{folder}`` is the campaign's own, which anybody may write to.
+        cwd, out: Folders; ``{folder}`` is the campaign's own, which is writable by every user.
         prefix: Words before the command.
         options: Options of the command.
-        umask: Of the process.
-        needs: Program without which it is left out.
+        umask: Umask of the process.
+        needs: Program without which it is skipped.
     """
 
     variables: dict[str, str | None] = field(default_factory=dict)
@@ -127,7 +127,7 @@ def environments(scale: results.Scale, folder: Path) -> results.Result:
 
 def _others_can_run(prefix: tuple[str, ...]) -> bool:
     """Whether the interpreter and this checkout can be used behind a prefix."""
-    # The prefix may execute what its processes may not.
+    # The prefix may execute files that its processes may not.
     words = [sys.executable, "-c", "import gen_data"]
     inner = f"import subprocess; subprocess.run({words!r}, check=True)"
     command = [*prefix, sys.executable, "-c", inner]
@@ -138,7 +138,7 @@ def _others_can_run(prefix: tuple[str, ...]) -> bool:
 
 
 def _generate(environment: Environment, folder: Path) -> str:
-    """Generate in a new folder; what is wrong, or nothing."""
+    """Generate in a new folder; the fault, or nothing."""
     folder.mkdir(mode=0o777)
     folder.chmod(0o777)
     cache = os.environ.get("XDG_CACHE_HOME", str(Path("~/.cache").expanduser()))

@@ -1,4 +1,4 @@
-"""The kernel kills a worker that exceeds its memory; the run goes on, or says so."""
+"""The kernel kills a worker that exceeds its memory; the run continues, or reports it."""
 
 import os
 import sys

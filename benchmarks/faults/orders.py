@@ -83,7 +83,7 @@ def samples_alone(scale: results.Scale, folder: Path) -> results.Result:
             [*command, str(index)], cwd=ROOT, capture_output=True, text=True, check=False
         )
         result.add(done.returncode == 0, f"sample {index} alone: {done.stderr[-300:]}")
-    result.notes.append(f"{n} in random order, {len(alone)} of them also in processes of their own")
+    result.notes.append(f"{n} in random order, {len(alone)} of them also in separate processes")
     with recorded_run.open_factory(1)() as pipeline:
         assert pipeline.sample(0).index == 0
     return result

@@ -80,7 +80,7 @@ class _Disk:
         _call("umount", str(self._root))
 
     def survive(self, instant_s: float, digest: str) -> tuple[str, bool]:
-        """What is wrong after a cut at an instant, and whether the data set was finished."""
+        """The fault after a cut at an instant if any, and whether the data set was finished."""
         self.format()
         self.mount()
         out, message = self._root / "out", self._image.with_suffix(".message")

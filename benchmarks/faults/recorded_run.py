@@ -29,7 +29,7 @@ RESUME = "gen-data --config tiny.yaml --n 6 --out here"
 
 @dataclass(frozen=True)
 class Replay:
-    """A pipeline of recorded samples, and what makes it in any process."""
+    """A pipeline of recorded samples, and the factory that makes it in any process."""
 
     info: interfaces.DatasetInfo
     exporters: Mapping[str, interfaces.Exporter]
@@ -115,7 +115,7 @@ def record(n: int = N) -> Recording:
 
 
 def open_factory(n: int) -> PipelineFactory:
-    """What makes pipelines of the tiny configuration."""
+    """Factory of pipelines of the tiny configuration."""
     return PipelineFactory(load_config(CONFIG), n)
 
 
@@ -142,7 +142,7 @@ def reference_digest(folder: Path, n: int = N) -> str:
 
 
 def resumes_to(out: Path, digest: str) -> str:
-    """Resume a run; empty if the result has this digest, else what is wrong."""
+    """Resume a run; empty if the result has this digest, otherwise the fault."""
     try:
         record().make(out)
     except errors.GenDataError as error:

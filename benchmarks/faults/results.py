@@ -19,9 +19,8 @@ class Scale:
 
     Attributes:
         is_full: Whether to make all attempts, instead of a sample of them.
-        seed: Of drawn faults.
-        end_s: Instant of the monotonic clock at which a campaign stops, with the attempts that it
-            has made.
+        seed: Seed of drawn faults.
+        end_s: Instant of the monotonic clock at which a campaign stops and reports its attempts.
     """
 
     is_full: bool
@@ -38,10 +37,10 @@ class Result:
     """Outcome of a campaign.
 
     Attributes:
-        attempts: Faults that were injected.
-        held: Those after which all promises held.
+        attempts: Number of injected faults.
+        held: Number of faults after which all promises held.
         notes: Counts in words, such as the number of operations.
-        skipped: What was left out -> the reason.
+        skipped: Skipped attempts -> the reason.
         failures: The first broken promises, in words.
         seconds: Duration.
     """
@@ -69,7 +68,7 @@ class Result:
             yield task
 
     def skip(self, what: str, reason: str) -> None:
-        """State what is left out."""
+        """Record a skipped attempt."""
         self.skipped[what] = reason
 
     @property

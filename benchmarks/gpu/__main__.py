@@ -4,8 +4,8 @@
     python -m benchmarks.gpu --references references.npz --json gpu.json
 
 About four minutes on a card of the class of an H100 with 16 cores, once kernels are compiled. Each
-part has a process and a limit of time; what fails or takes too long is named at the end.
-``--device cpu`` takes the same path with tiny sizes.
+part has a process and a time limit; failures and timeouts are listed at the end. ``--device cpu``
+takes the same path with tiny sizes.
 """
 
 import argparse

@@ -1,8 +1,8 @@
-"""The CPU takes the path of a GPU: what it computes can then be checked on any machine.
+"""The CPU takes the path of a GPU: its results can then be checked on any machine.
 
-Kernels are compiled from the text for CUDA, one lane per thread; the host sees a device with memory
-of its own; lists that a GPU fills in any order are shuffled. Threads still run one after another,
-and arithmetic is the CPU's.
+Kernels are compiled from the text for CUDA, one lane per thread; the host sees a device with
+separate memory; lists that a GPU fills in any order are shuffled. Threads still run one after
+another, and arithmetic is the CPU's.
 """
 
 import sys

@@ -81,8 +81,8 @@ def time_sweeps(device: str, rays: int, repeats: int, small: bool) -> dict[str, 
     """Rays per second of a sweep of an HDL-64E in traffic, and of as many sweeps as make ``rays``.
 
     Args:
-        device: Of the renderer.
-        rays: At least, of the launch of many.
+        device: Device of the renderer.
+        rays: Smallest number of rays in the launch of many sweeps.
         repeats: Measurements of each launch.
         small: Take a VLP-16 in a room instead.
 

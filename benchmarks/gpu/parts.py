@@ -1,6 +1,6 @@
-"""Parts of the measurement, each in a process of its own with a limit of time.
+"""Parts of the measurement, each in a separate process with a time limit.
 
-A part that fails, hangs or kills its process costs its own figures only. Functions are named
+A part that fails, hangs or kills its process loses only its own figures. Functions are named
 ``module:function`` below this package; arguments and results are JSON.
 """
 
@@ -25,10 +25,10 @@ _MARK = "benchmarks.gpu result: "
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a part.
+    """Outcome of a part.
 
     Attributes:
-        name: Of the part, with its configuration.
+        name: Name of the part, with its configuration.
         seconds: From start to end.
         value: JSON; None after a failure.
         failure: File, kernel and error; empty if there is none.
@@ -41,7 +41,7 @@ class Result:
 
 
 def run_part(name: str, function: str, limit_s: float, /, **arguments: Any) -> Result:
-    """Call a function in a process of its own."""
+    """Call a function in a separate process."""
     started_s = time.perf_counter()
     command = [sys.executable, "-m", "benchmarks.gpu.parts", function, json.dumps(arguments)]
     try:
@@ -86,7 +86,7 @@ def named_kernels(synchronize: bool) -> Iterator[list[str]]:
 
 
 def _place(error: BaseException) -> str:
-    """The innermost of our own lines that an error came through."""
+    """The innermost line of this project in the traceback of an error."""
     own = [
         f for f in traceback.extract_tb(error.__traceback__) if _ROOT in Path(f.filename).parents
     ]

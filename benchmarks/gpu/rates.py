@@ -44,10 +44,10 @@ def measure_rates(
 
     Args:
         config: Name of the workload.
-        device: Of the renderer.
-        workers: Numbers of workers; of fewer that are ready, all are measured.
+        device: Device of the renderer.
+        workers: Numbers of workers; if fewer are ready, all of these are measured.
         window_s: Length of each measurement.
-        limit_s: Bound of all: of filling caches, starting workers, and measuring.
+        limit_s: Total time limit for filling caches, starting workers, and measuring.
         small: Whether images are tiny.
         scenes: Largest pool.
 
@@ -56,7 +56,7 @@ def measure_rates(
         device had work, by the same keys; ``device_mb``: memory that all workers hold on it;
         ``stages``: CPU ms per sample to disk by stage, of the largest number of workers;
         ``scenes``: size of the pool; ``ready``: number of workers; ``start_s``: until they were;
-        ``left_out``: what is missing, and why.
+        ``left_out``: skipped measurements, and why.
     """
     started_s = time.perf_counter()
     fill_s, ready_s, end_s = (started_s + limit_s * share for share in (_FILL, _START, 1.0))
@@ -96,7 +96,7 @@ def measure_rates(
 def _work_together(
     workers: "Sequence[_Worker]", place: str, window_s: float, pool: int, end_s: float
 ) -> list[Answer]:
-    """Answers of workers at work at the same time, of those in time; of none near the end."""
+    """Timely answers of workers that work at the same time; none near the end."""
     if time.perf_counter() + window_s > end_s:
         return []
     waiting = [one.ask(place, window_s, pool) for one in workers]
@@ -114,7 +114,7 @@ def _device_mb() -> float:
 
 
 class _Worker:
-    """A worker process, asked through its pipes; what it answers too late is dropped."""
+    """A worker process, queried through its pipes; late answers are dropped."""
 
     def __init__(self, command: list[str], log: Path) -> None:
         self._log = log
@@ -134,7 +134,7 @@ class _Worker:
         self._answers.put(None)
 
     def ask(self, place: str, window_s: float, pool: int) -> Callable[[float], Answer | None]:
-        """Let it work; returns what waits for its answer until an instant at most."""
+        """Start its work; returns a function that waits for the answer until an instant at most."""
         self._asked += 1
         number = self._asked
         assert self.process.stdin is not None

@@ -1,7 +1,7 @@
 """Reference samples of the shipped configurations, made on a CPU and compared on a device.
 
-A reference has the scene of a sample, and what its sensors saw: randomizers and physics take no
-part in the comparison. Visibility is found by rays, as on a GPU; the rasteriser of the CPU snaps
+A reference has the scene of a sample, and the readings of its sensors: randomizers and physics take
+no part in the comparison. Visibility is found by rays, as on a GPU; the rasteriser of the CPU snaps
 edges to a grid and differs from rays in single pixels.
 """
 
@@ -77,7 +77,7 @@ def make_references(name: str) -> Arrays:
 
 
 def observed(sample: Sample) -> Iterator[tuple[str, NDArray[Any]]]:
-    """What the sensors saw and what was labelled, reduced to what is compared.
+    """Readings and labels of a sample, reduced to the compared data.
 
     Photographs are PNG files; label images their digest and, for diagnosis, whole ids or every
     31st number; points every n-th, with the digest of all ids; annotations a digest.

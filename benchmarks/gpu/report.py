@@ -1,4 +1,4 @@
-"""The table of docs/performance.md from the figures, and what falls short of the goals."""
+"""The table of docs/performance.md from the figures, and the goals that were missed."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ GOALS = (
 
 
 def format_report(figures: Mapping[str, Any], failures: Mapping[str, str]) -> str:
-    """Markdown of everything measured, then the goals, then what is missing."""
+    """Markdown of all measurements, then the goals, then missing parts."""
     parts = [
         _card(figures.get("card") or {}), _correctness(figures.get("correct") or {}),
         _rates(figures.get("rates") or {}),

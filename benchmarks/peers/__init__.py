@@ -1,1 +1,1 @@
-"""Renderers of others, and the scenes that they draw beside this project's."""
+"""Renderers of other projects, and the scenes that they and this project's renderer draw."""

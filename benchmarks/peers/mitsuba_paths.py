@@ -12,7 +12,7 @@ SAMPLES_PER_PIXEL = 16
 """Of the light; depth and ids come from a second image with one sample per pixel."""
 AMBIENT = 0.05
 GAIN = 1e-3
-"""Radiance to linear sRGB, about what automatic exposure finds."""
+"""Factor from radiance to linear sRGB, close to the result of automatic exposure."""
 
 
 def open_renderer(worlds: Sequence[World]) -> Callable[[World], Images]:

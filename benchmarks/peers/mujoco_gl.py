@@ -39,7 +39,7 @@ def open_renderer(worlds: Sequence[World]) -> Callable[[World], Images]:
     bodies_of_geoms = np.append(model.geom_bodyid, 0)  # -1, nothing, is the last one
     try:
         renderer = mujoco.Renderer(model, height_px, width_px)
-    except Exception as error:  # each platform of PyOpenGL raises errors of its own
+    except Exception as error:  # each platform of PyOpenGL raises different errors
         raise ImportError(f"no EGL driver: {error}") from error
 
     def draw(world: World) -> Images:

@@ -1,7 +1,7 @@
-"""One renderer in a process of its own: ``python -m benchmarks.peers.worker NAME FOLDER CORE``.
+"""One renderer in a separate process: ``python -m benchmarks.peers.worker NAME FOLDER CORE``.
 
 Answers every line on standard input by writing all samples of FOLDER once, and one line of JSON
-with the CPU seconds that took (of all threads, with system time).
+with the CPU seconds used (of all threads, with system time).
 """
 
 import json

@@ -1,9 +1,9 @@
 """Scenes of the comparison with other renderers: ten objects on a ground.
 
 In the workload ``fine`` each has 12,012 triangles, and every view has its own scene. In ``small``
-five have 480 triangles and five are primitives, and five views share a scene, as where a renderer
-of a physics engine is at home. Everything is made here, from formulas, so that the workload is the
-same wherever it runs.
+five have 480 triangles and five are primitives, and five views share a scene, which is typical for
+renderers of physics engines. All data is computed here from formulas: the workload is the same on
+every machine.
 """
 
 import pickle
@@ -111,7 +111,7 @@ def prism_mesh(sides: int, size_m: tuple[float, float, float], taper: float = 1.
     Args:
         sides: Corners of the base, the first between +X and +Y; even.
         size_m: Lengths of the box around the base, and the height.
-        taper: Size of the top by that of the base.
+        taper: Size of the top divided by the size of the base.
     """
     angle = 2 * np.pi * (np.arange(sides) + 0.5) / sides
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -120,7 +120,7 @@ def prism_mesh(sides: int, size_m: tuple[float, float, float], taper: float = 1.
         np.column_stack([share * ring, np.full(sides, z)])
         for share, z in ((1.0, -0.5 * size_m[2]), (taper, 0.5 * size_m[2]))
     )
-    # Every side has vertices of its own: renderers smooth others.
+    # Every side has separate vertices: renderers smooth shared ones.
     walls = np.stack([low, np.roll(low, -1, 0), np.roll(high, -1, 0), high], axis=1)
     corner = 4 * np.arange(sides)[:, None]
     fan = np.arange(1, sides - 1)[:, None]

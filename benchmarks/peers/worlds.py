@@ -1,6 +1,6 @@
-"""Scenes, images and files as every renderer of the comparison takes and writes them.
+"""Scenes, images and files in the form that every renderer of the comparison reads and writes.
 
-Renderers run in interpreters of their own, so that this module needs NumPy and OpenCV only.
+Renderers run in separate interpreters, which is why this module imports only NumPy and OpenCV.
 """
 
 import json
@@ -65,12 +65,12 @@ class World:
 
     @property
     def focus_m(self) -> NDArray[np.float64]:
-        """Mean position of the bodies: what lamps with a direction shine at."""
+        """Mean position of the bodies: the target of lamps with a direction."""
         return np.array(self.T_world_bodies)[:, :3, 3].mean(axis=0)
 
 
 class Images(NamedTuple):
-    """What a renderer draws.
+    """Output of a renderer.
 
     Attributes:
         rgb: uint8 [height, width, 3].
@@ -89,7 +89,7 @@ def write_worlds(worlds: Sequence[World], folder: Path) -> None:
 
 
 def read_worlds(folder: Path) -> list[World]:
-    """Read what ``write_worlds`` wrote."""
+    """Read files of ``write_worlds``."""
     worlds: list[World] = pickle.loads((folder / WORLDS_NAME).read_bytes())
     return worlds
 

@@ -89,7 +89,7 @@ def make_data(folder: Path) -> None:
 
 
 def print_table(results: "list[tuple[Reader, Comparison | None]]") -> None:
-    """Print one row per reader, then what is wrong, and which packages are absent."""
+    """Print one row per reader, then the faults and the absent packages."""
     from rich.console import Console
     from rich.table import Table
 

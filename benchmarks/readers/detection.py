@@ -148,7 +148,7 @@ def sides(box: Any) -> Any:
 
 
 def by_sahi(root: Path) -> Iterator[View]:
-    """COCO as SAHI slices it; masks are those that it draws."""
+    """COCO as sliced by SAHI; masks are drawn by SAHI."""
     from sahi.annotation import ObjectAnnotation
     from sahi.utils.coco import Coco
 
@@ -199,7 +199,7 @@ def by_ultralytics(task: str) -> Callable[[Path], Iterator[View]]:
         from ultralytics.data.dataset import YOLODataset
 
         utils.check_font = lambda *_: None  # no download
-        # It writes caches beside the labels.
+        # It writes caches next to the labels.
         folder = shutil.copytree(root / task, f"{scratch}/yolo")
         data = utils.check_det_dataset(f"{folder}/data.yaml", autodownload=False)
         for split in ("train", "val"):
@@ -261,8 +261,8 @@ def by_datumaro(
 
     Args:
         format_: Its name for the format.
-        folders: Pattern of the folders to read, below that of the export; empty = that.
-        name_of: Name of a view from that of an item.
+        folders: Pattern of the folders to read, below the export's folder; empty = this folder.
+        name_of: Name of a view from the name of an item.
         without: Class to leave out.
     """
 
@@ -291,7 +291,7 @@ def by_datumaro(
 
 
 DATUMARO = ("bbox", "rotated_bbox", "mask", "polygon")
-"""Annotations with boxes; those of the first kind that an object has count."""
+"""Annotations with boxes; only annotations of the first kind that an object has."""
 
 
 def _datumaro_mask(group: Sequence[Any], height: int, width: int) -> Any:

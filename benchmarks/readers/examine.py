@@ -1,4 +1,4 @@
-"""Comparison of what readers find with what data sets state, in a process of its own."""
+"""Comparison of results of readers with data sets, in a separate process."""
 
 import contextlib
 import io
@@ -14,13 +14,13 @@ from benchmarks.readers.views import Comparison
 
 
 def examine_rows(rows: Sequence[int], folder: Path, scratch: str) -> dict[int, Comparison | None]:
-    """Compare what readers find, by their numbers in the table."""
+    """Compare results of readers, by their numbers in the table."""
     tempfile.tempdir = scratch
     return {k: examine(READERS[k], folder) for k in rows}
 
 
 def examine(reader: Reader, folder: Path) -> Comparison | None:
-    """Compare what a reader finds with what the data set states; None without its packages."""
+    """Compare a reader's result with the data set; None without its packages."""
     if not is_installed(reader):
         return None
     comparison, stated = Comparison(), folder / reader.data.replace("runs", "tabletop")

@@ -196,7 +196,7 @@ def by_torchvision_cityscapes(root: Path) -> Iterator[View]:
 
 
 def by_panopticapi(root: Path) -> Iterator[View]:
-    """Things of COCO panoptic: pixels of each id."""
+    """Segments of COCO panoptic: pixels of each id."""
     from panopticapi.utils import rgb2id
     from PIL import Image
 

@@ -65,7 +65,7 @@ def by_tfrecord_geometry(root: Path) -> Iterator[View]:
 
 
 def geometry_views(k: int, values: dict[str, Any]) -> Iterator[View]:
-    """Geometry of one step, by the names of its features; rows of 0 are no objects."""
+    """Geometry of one step, by the names of its features; rows of 0 are padding."""
     ids = np.atleast_1d(values["object_id"])
     things = [thing(f"pose {n}", p) for n, p in zip(ids, values["object_pose"], strict=True) if n]
     edges = values["relation"][values["relation"].any(axis=1)]
@@ -107,7 +107,7 @@ def decoded(file: Any) -> Any:
 
 
 def segments(ids: Any, names: Any) -> tuple[Thing, ...]:
-    """A thing per value of an image; ``names`` are of the same shape."""
+    """An object per value of an image; ``names`` have the same shape."""
     values = (ids == value for value in np.unique(ids) if value)
     return tuple(of_pixels(str(names[pixels][0]), pixels) for pixels in values)
 
@@ -160,8 +160,8 @@ def by_graspnet(root: Path) -> Iterator[View]:
 def by_torchvision_stereo(root: Path) -> Iterator[View]:
     """KITTI's benchmark of 2015: disparities, and flow of the frames that have a next one.
 
-    The reader of disparities takes images of the next step for further pairs, of the original
-    data too: it gets those of the first step only.
+    The reader of disparities takes images of the next step for further pairs, also in the original
+    data: it gets images of the first step only.
     """
     detection.import_torchvision()
     import torch
@@ -203,7 +203,7 @@ def by_trackeval(root: Path) -> Iterator[View]:
 
 
 def by_open3d_ml(root: Path) -> Iterator[View]:
-    """SemanticKITTI: points of each instance; moving classes become those of things at rest."""
+    """SemanticKITTI: points of each instance; moving classes become static ones."""
     from open3d._ml3d.datasets import SemanticKITTI
 
     names = SemanticKITTI.get_label_to_names()

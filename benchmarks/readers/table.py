@@ -45,14 +45,14 @@ class Reader:
     Attributes:
         package: The distribution that reads.
         format: Name of the exporter, and of its folder.
-        read: Yields what the export holds.
-        expected: Yields what the data set states.
+        read: Yields the content of the export.
+        expected: Yields the content of the data set.
         data: Name of the data set (``__main__.DATA``).
-        unit: Of the numbers, such as ``px`` or ``m``; empty for a reader of lenses only.
+        unit: Unit of the numbers, such as ``px`` or ``m``; empty for a reader of lenses only.
         tolerance: Largest difference of a number.
         iou: Smallest overlap of masks; None if it reads none.
         lens: Largest difference of lenses [px, coefficients]; None if it reads none.
-        is_partial: Whether the format leaves things out by its definition.
+        is_partial: Whether the format omits objects by its definition.
         because: Reason of tolerances other than 0 and 1, and of conventions.
         needs: Further distributions that the reader imports, but its package does not require.
     """
@@ -233,7 +233,7 @@ WITHOUT_READER = {
     "culane": "its evaluation is in no registry: benchmarks.readers.evaluations",
     "lidar_flow": "judged by av2 and FlowNet3D: benchmarks.readers.evaluations",
     "map_vectors": "its evaluation is in no registry: benchmarks.readers.evaluations",
-    "opendrive": "our reader; ASAM's checker requires packages of its own (docs/maps.md)",
+    "opendrive": "our reader; ASAM's checker requires separate packages (docs/maps.md)",
     "openlane": "its evaluation is in no registry: benchmarks.readers.evaluations",
     "scene_text": "its evaluations are in no registry: benchmarks.readers.evaluations",
 }

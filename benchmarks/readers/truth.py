@@ -1,4 +1,4 @@
-"""What the data set itself states, read by ``gen_data.open``: expected values for readers."""
+"""Content of the data set, read by ``gen_data.open``: expected values for readers."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
@@ -64,7 +64,7 @@ class Boxes:
 
     Attributes:
         cameras: Names; all without them.
-        shift: What the reader adds to left, top, right and bottom by its convention.
+        shift: Offsets that the reader adds to left, top, right and bottom by its convention.
         name_of: Class of an instance in the format; empty = left out.
         along_heading: Boxes around the corners of the oriented ones instead, without masks.
     """
@@ -168,7 +168,7 @@ def scanned_instances(folder: Path) -> Iterator[View]:
 
 
 def scan_class(instance: Instance) -> str:
-    """Class of SemanticKITTI that its benchmark judges; empty for what is not counted."""
+    """Class of SemanticKITTI that its benchmark judges; empty for objects that do not count."""
     rider = instance.category in SCAN_RIDERS and dict(instance.attributes).get("rider") == "yes"
     return (SCAN_RIDERS if rider else SCAN_CLASSES).get(instance.category, "")
 
@@ -260,7 +260,7 @@ def joints(folder: Path) -> Iterator[View]:
 
 
 def step_geometry(folder: Path) -> Iterator[View]:
-    """What surrounds an arm: poses, contacts, relations, depths, instances and cameras."""
+    """Surroundings of an arm: poses, contacts, relations, depths, instances and cameras."""
     for sample in gen_data.open(folder):
         (arm,) = sample.scene.articulations
         things = [

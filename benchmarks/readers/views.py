@@ -1,4 +1,4 @@
-"""Views: what an image, a scan or a trajectory holds, as read by anybody; and their comparison."""
+"""Views: content of an image, a scan or a trajectory, read by any reader; their comparison."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -31,7 +31,7 @@ class Thing:
 
 @dataclass(frozen=True)
 class View:
-    """What one file, image or scan holds.
+    """Content of one file, image or scan.
 
     Attributes:
         name: ``<sample>_<sensor>``.
@@ -45,25 +45,25 @@ class View:
 
 
 def thing(category: str, numbers: Iterable[float], mask: object = None) -> Thing:
-    """A thing of plain values."""
+    """An object with plain values."""
     flat = np.array(numbers if isinstance(numbers, np.ndarray) else list(numbers), float).ravel()
     return Thing(category, flat, None if mask is None else np.asarray(mask).astype(bool))
 
 
 def from_corner(category: str, box: Iterable[float], mask: object = None) -> Thing:
-    """A thing whose box is left, top, width and height."""
+    """An object whose box is left, top, width and height."""
     x, y, width, height = (float(value) for value in box)
     return thing(category, (x, y, x + width, y + height), mask)
 
 
 def of_pixels(category: str, mask: NDArray[np.bool_]) -> Thing:
-    """A thing with the box of its mask."""
+    """An object with the box of its mask."""
     y, x = np.nonzero(mask)
     return thing(category, (x.min(), y.min(), x.max() + 1, y.max() + 1), mask)
 
 
 def cube(category: str, pose: SE3, size_m: Iterable[float]) -> Thing:
-    """A thing in space: centre, and half its length, width and height along its axes [m]."""
+    """An object in space: centre, and half its length, width and height along its axes [m]."""
     matrix = pose.matrix()
     axes = matrix[:3, :3].T * np.array(list(size_m))[:, None] / 2
     return thing(category, np.vstack([matrix[:3, 3], axes]))
@@ -71,15 +71,15 @@ def cube(category: str, pose: SE3, size_m: Iterable[float]) -> Thing:
 
 @dataclass
 class Comparison:
-    """Differences of what a reader found from what the data set states.
+    """Differences between a reader's result and the data set.
 
     Attributes:
-        objects: Number of things that were compared.
+        objects: Number of objects compared.
         worst: Largest difference of a number.
         iou: Smallest overlap of masks; None without masks.
         lens: Largest difference of focal lengths and principal points [px] and coefficients; None
             without lenses.
-        faults: What is missing, or there without being stated.
+        faults: Missing objects, and objects that the data set does not state.
     """
 
     objects: int = 0
@@ -92,9 +92,9 @@ class Comparison:
         """Compare views of the same name.
 
         Args:
-            stated: By the data set.
-            found: By a reader.
-            is_partial: Whether the format leaves things out by its definition.
+            stated: Views of the data set.
+            found: Views found by a reader.
+            is_partial: Whether the format omits objects by its definition.
         """
         others = {view.name: view for view in found}
         for view in stated:

@@ -1,4 +1,4 @@
-"""Cartons with what makes them real: joints, tape, labels with bar codes, printed arrows."""
+"""Cartons with realistic details: joints, tape, labels with bar codes, printed arrows."""
 
 from collections.abc import Sequence
 
@@ -18,11 +18,11 @@ def tape_carton(
     """Add a closed carton: body, tape over the joint of its flaps, a label, printed marks.
 
     Args:
-        patches: Where to add it.
-        low: Its lower corner.
-        high: Its upper corner.
+        patches: List to which its patches are added.
+        low: Its lower corner [m].
+        high: Its upper corner [m].
         rng: Draws.
-        slots: Of card, tape, label and print.
+        slots: Material slots of card, tape, label and print.
     """
     card, tape, label, ink = slots
     (x0, y0, z0), (x1, y1, z1) = low, high

@@ -1,4 +1,4 @@
-"""Small things that lie about in homes, offices and workshops. Sizes are assumed: usual ones."""
+"""Small objects that lie about in homes, offices and workshops. Typical sizes, assumed."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What hangs, lies and shines in rooms: lamps, curtains, rugs, pictures, mirrors, screens."""
+"""Room fittings: lamps, curtains, rugs, pictures, mirrors, screens."""
 
 import math
 from dataclasses import replace
@@ -398,7 +398,7 @@ def house_plant(rng: VariantRng) -> Solid:
     length = rng.between(0.45, 0.8, "length_m") if big else rng.between(0.12, 0.24, "length_m")
     for k in range(count):
         # Leaves grow the golden angle apart (Vogel, Mathematical Biosciences 44, 1979): to all
-        # sides, so that the plant stands.
+        # sides, which balances the plant.
         turn = k * math.pi * (3.0 - math.sqrt(5.0)) + rng.between(-0.4, 0.4)
         blade = _leaf(rng, length * rng.between(0.6, 1.0)).rotated("z", turn)
         patches.append(blade.moved(0.0, 0.0, 0.86 * h))

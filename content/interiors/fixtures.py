@@ -274,7 +274,7 @@ def wash_basin(rng: VariantRng) -> Solid:
     ]
     made = solid(patches, [ceramic(), front(rng), _CHROME], [((-x, -y, 0.25), (x, y, z))])
     made = _with_water(made, (-x + 0.07, 0.0, z), height, z - 0.09)
-    # The rim behind the bowl, beside the tap.
+    # The rim behind the bowl, next to the tap.
     rim_m = (-x + 0.012, 0.08, z), (-x + 0.12, y - 0.012, z)
     supports = tuple(Keypoint(SUPPORT, corner) for corner in rim_m)
     return replace(made, keypoints=(*made.keypoints, *supports))

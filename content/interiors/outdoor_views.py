@@ -1,4 +1,4 @@
-"""What is seen through windows: sky, roofs or trees, and the ground, as emitted light."""
+"""Views through windows: sky, roofs or trees, and the ground, as emitted light."""
 
 import numpy as np
 

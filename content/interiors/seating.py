@@ -1,4 +1,4 @@
-"""Seats, beds and tables. Sizes are assumed: those that furniture is usually sold in."""
+"""Seats, beds and tables. Usual sizes of furniture on sale, assumed."""
 
 import math
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ from gen_data.core.se3 import Vec3
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
 PIPING_HEIGHT = 0.9
-"""Of a cushion's half height: below its top, so that things lie flat."""
+"""Share of a cushion's half height, just below its top, at which objects lie flat."""
 
 
 def upholstered(family: str, seed: int, measures: Measures) -> Solid:

@@ -32,7 +32,7 @@ _TILE_M = 0.008
 
 
 SILL_REACH_M, SILL_BESIDE_M = 0.05, 0.04
-"""How far sills of windows stand out of the wall, and beside the opening."""
+"""Protrusion of window sills from the wall, and past the sides of the opening [m]."""
 
 
 def floor(size_m: tuple[float, float] = (4.0, 4.0)) -> Solid:
@@ -233,7 +233,7 @@ def outside(radius_m: float = 130.0) -> Solid:
     """The ground around a building, at z = 0, from its middle to a horizon. Slot: ground.
 
     Args:
-        radius_m: Of the disc.
+        radius_m: Radius of the disc.
     """
     turn = 2.0 * math.pi * np.arange(49) / 48
     reach = np.array([0.05, 0.15, 0.4, 1.0])[:, None] * radius_m

@@ -143,13 +143,13 @@ def drape(
     slot: int,
     crease_m: float = 0.016,
 ) -> Patch:
-    """A cover over a mattress, from the head's end on: it hangs over both sides and the foot.
+    """A cover over a mattress, starting near the head end; it hangs over both sides and the foot.
 
     Args:
-        ends_x: Where it begins and ends.
+        ends_x: X of its beginning and end.
         half_y: Half of the mattress's width.
         z: Height of the mattress.
-        hang_m: How far it falls beside the mattress.
+        hang_m: Length that hangs down at the sides of the mattress.
         rng: Draws.
         slot: Material.
         crease_m: Size of its folds.
@@ -169,7 +169,7 @@ def drape(
     flat = np.clip((s - x0) / 0.25, 0.25, 1.0)
     lift = lift * flat
     swell = 0.03 * np.minimum(np.abs(half_y - np.abs(t)) / 0.2, 1.0) * (np.abs(t) < half_y)
-    # What hangs is pushed outwards by its folds, which run downwards.
+    # Folds of the hanging part run downwards and push it outwards.
     hung = np.clip(-down / 0.12, 0.0, 1.0)
     pleat = 0.012 * (1.0 + np.sin(2.0 * math.pi * s / 0.19 + 2.0 * np.sin(3.0 * s) + np.sign(t)))
     out = np.sign(t) * hung * (0.4 * lift + pleat)

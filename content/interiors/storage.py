@@ -1,7 +1,7 @@
-"""Cupboards, shelves, appliances and racks. Parts that open are families of their own.
+"""Cupboards, shelves, appliances and racks. Parts that open are separate families.
 
-A part hangs at its origin: the hinge of a door, the closed place of a drawer. The keypoints
-``hinge`` and ``slide`` of the piece say where.
+The origin of a part is the hinge of a door, or the closed position of a drawer. The keypoints
+``hinge`` and ``slide`` of the piece mark these points.
 """
 
 from dataclasses import replace
@@ -123,7 +123,7 @@ def cupboard(family: str, seed: int, measures: Measures) -> Solid:
         rail = levels[1] + RAIL_M
         patches.append(rod((0.0, -0.5 * w + 0.02, rail), (0.0, 0.5 * w - 0.02, rail), 0.012, 2))
     made = solid(patches, _looks(family, rng, seed), outer)
-    # Behind the door: the left half of what has two.
+    # Behind the door, which covers the left half if there are two.
     end = (0.0 if doors == 2 and family == "wardrobe" else half) - _T
     inside = []
     for z, above in zip(levels, (*levels[1:], high), strict=True):
@@ -177,7 +177,7 @@ def cupboard_door(family: str, seed: int, measures: Measures) -> Solid:
 
 
 def _leaf(box: Box, log_m: float) -> Patch:
-    """A door's board, cut at ``log_m`` from a log: those of one look differ, as veneers do."""
+    """A door's board, cut at ``log_m`` from a log: boards of one look differ, as veneers do."""
     low, high = ((x, y + log_m, z) for x, y, z in box)
     return board(low, high, 1).moved(0.0, -log_m, 0.0)
 
@@ -374,7 +374,7 @@ def pallet(rng: VariantRng) -> Solid:
 
 
 def _goods(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
-    """What is on a pallet, above z = 0 from slot 1 on; its materials and height [m]."""
+    """Load of a pallet, above z = 0 and from slot 1 on; its materials and height [m]."""
     match seed % 9:
         case 0 | 1 | 2 | 3:
             return _cartons(seed, rng, wrapped=seed % 9 in (1, 3))
@@ -414,7 +414,7 @@ def _cartons(
 
 
 def _in_film(looks: list[Material]) -> list[Material]:
-    """What stretch film makes of materials: they shine. The film itself lies close on them."""
+    """Materials under stretch film, which makes them glossy; the film has no mesh."""
     return [replace(look, roughness=_FILM_ROUGHNESS) for look in looks]
 
 

@@ -1,4 +1,4 @@
-"""What stands behind doors, on racks and in workshops. Sizes are assumed: usual ones."""
+"""Goods behind doors, on racks and in workshops. Typical sizes, assumed."""
 
 import math
 from collections.abc import Callable, Sequence

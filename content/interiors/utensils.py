@@ -1,4 +1,4 @@
-"""Things of workshops, stores and cupboards: containers, tools and transport. Sizes are assumed."""
+"""Containers, tools and transport equipment of workshops, stores and cupboards; assumed sizes."""
 
 import math
 from itertools import pairwise

@@ -1,6 +1,6 @@
-"""What hangs in frames: paintings, prints, drawings, photographs and maps, upright or lying.
+"""Framed pictures: paintings, prints, drawings, photographs and maps, portrait or landscape.
 
-All motifs are made of noise and of a few curves; nothing shows a work or a place that exists.
+All motifs consist of noise and a few curves; none shows an existing work or place.
 """
 
 import math

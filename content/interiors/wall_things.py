@@ -1,4 +1,4 @@
-"""What hangs on walls and carries or holds things: shelves, rails, boards, sockets, switches.
+"""Wall-mounted fixtures: shelves, rails, boards, sockets, switches.
 
 Origin at the lowest point, in the middle of the back.
 """

@@ -101,7 +101,7 @@ def collada_to_obj(source: Path, target: Path) -> None:
     colors: dict[str, str] = {}
     lines, count = [f"mtllib {target.stem}.mtl"], 0
     for name, color, corners in _read_collada(source):
-        # Blender, which wrote these files, writes linear values; those of MTL are sRGB.
+        # Blender, which wrote these files, writes linear values; values of MTL are sRGB.
         colors[name] = " ".join(f"{c:.4f}" for c in colorimetry.srgb_encode(color))
         points, numbers = np.unique(corners, axis=0, return_inverse=True)
         lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]

@@ -1,11 +1,11 @@
-"""A body from formulas: lofted limbs in the proportions of tables, for when no pack is installed.
+"""A body from formulas: lofted limbs with tabulated proportions, used if no pack is installed.
 
-It shares the template frame, the zones and the shape names of the pack's body, so that the same
-clothes and poses apply to both.
+It shares the template frame, the zones and the shape names of the pack's body: the same clothes and
+poses apply to both.
 
 Lengths are shares of stature from Drillis and Contini, "Body segment parameters", New York
 University 1966, as drawn in Winter, "Biomechanics and motor control of human movement", fig. 4.1;
-breadths are those of Gordon et al., "2012 anthropometric survey of U.S. Army personnel", 2014.
+breadths are from Gordon et al., "2012 anthropometric survey of U.S. Army personnel", 2014.
 """
 
 import math
@@ -316,7 +316,7 @@ def _along_chain(bones: Bones, heights: Array, chain: Sequence[str], axis: int) 
 
     Args:
         bones: All bones.
-        heights: Of the points: coordinate ``axis``, or minus the distance along the arm for -1.
+        heights: Coordinate ``axis`` of the points, or minus the distance along the arm for -1.
         chain: Bones from one end to the other.
         axis: 2 for heights in z, -1 for distances along the arm.
     """

@@ -45,10 +45,10 @@ class BodyTemplate:
         parents: Index of each bone's parent, -1 for the root, int64 [bones].
         points_m: Bone heads, landmarks, vertices in the template frame, float64 [points, 3].
         targets: Names of the shapes, words joined by hyphens (``male-old-maxweight``).
-        deltas: What each shape adds to the points, in units of ``DELTA_M``,
-            int16 [targets, points, 3].
+        deltas: Displacement of the points by each shape, in units of ``DELTA_M``, int16 [targets,
+            points, 3].
         weight_bones: Bones that move each point, int64 [points, 4].
-        weights: Their shares, 1 in sum, float64 [points, 4].
+        weights: Their shares, which sum to 1, float64 [points, 4].
         faces: ``{zone: int64 [n, 3]}``, indices into the points.
     """
 
@@ -82,7 +82,7 @@ class BodyTemplate:
         return len(self.bones) + LANDMARKS.index(name)
 
     def bone(self, name: str) -> int:
-        """Index of a bone, which is also that of its head among the points."""
+        """Index of a bone, which is also the index of its head among the points."""
         return self.bones.index(name)
 
 

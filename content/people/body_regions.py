@@ -1,8 +1,9 @@
 """Zones of a template mesh: cuts along level lines, and their number of triangles.
 
 A mesh here is rows of values, one per vertex, whose first three are the position: shapes and
-weights are cut along with it. Coordinates are those of the people pack's base shape in the template
-frame [m]; they were read off its joints and its outline. Both halves are cut alike, by ``|y|``.
+weights are cut along with it. Coordinates are in the template frame [m] and refer to the base shape
+of the people pack; they were read off its joints and outline. Both halves are cut alike, by
+``|y|``.
 """
 
 from collections.abc import Callable, Sequence
@@ -68,9 +69,9 @@ def split_region(rows: MeshRows, zone: str, into: str, level: Level) -> MeshRows
 
 
 def simplify_region(rows: MeshRows, zone: str, max_faces: int) -> MeshRows:
-    """The same mesh with about ``max_faces`` triangles in a zone; its border stays as it is.
+    """The same mesh with about ``max_faces`` triangles in a zone; the zone's border is unchanged.
 
-    Vertices that remain keep their place, so that every shape and weight still belongs to them.
+    Remaining vertices keep their positions, and with them their shapes and weights.
     """
     import fast_simplification
 
@@ -242,9 +243,10 @@ _FEATURES = {
 
 
 def mark_features(rows: MeshRows) -> MeshRows:
-    """The mesh with the features of its face as zones of their own, for ``simplify_region``.
+    """The mesh with the features of its face as separate zones, for ``simplify_region``.
 
-    Its edges are not cut: zones of features are merged again. What an eyeball hides is dropped.
+    Its edges are not cut: zones of features are merged again. Faces hidden by an eyeball are
+    dropped.
     """
     zones = rows.zones.copy()
     face = np.flatnonzero(zones == "face")

@@ -1,4 +1,4 @@
-"""Things that people carry, push and pull, made to fit their hands, shoulders and heads.
+"""Items that people carry, push and pull, fitted to their hands, shoulders and heads.
 
 Sizes are of common products: a phone of 150 x 75 mm, a cabin suitcase of 55 x 40 x 23 cm, an
 umbrella of 1 m across, a pram of 0.8 x 0.5 m; assumed, +/- 15 %.
@@ -43,15 +43,15 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Carrier:
-    """A posed person, as far as carried things need it.
+    """A posed person, reduced to the data that carried items need.
 
     Attributes:
         posed_m: Bone heads and landmarks [m], shape [bones + landmarks, 3].
-        transforms: Of every bone, shape [bones, 3, 4].
-        scale: The person's size against the template's.
+        transforms: Transforms of all bones, shape [bones, 3, 4].
+        scale: Size of the person divided by the size of the template.
         ground_m: Height of the lowest vertex.
-        surface: Places of the top's vertices in the template frame, in the pose, and their normals;
-            empty unless the bag is one of ``STRAPPED``.
+        surface: Positions of the top's vertices in the template frame and in the pose, and their
+            normals; empty unless the bag is one of ``STRAPPED``.
     """
 
     person: Person
@@ -130,10 +130,10 @@ def _hanging_bag(
     """A bag that hangs from a hand by two cords and keeps upright.
 
     Args:
-        carrier: Who holds it.
+        carrier: Person who holds it.
         side: ``l`` or ``r``.
         body: Makes the bag from its middle and size [m].
-        material: Of all of it.
+        material: Material of all parts.
     """
     grip, scale = carrier.grip(side), carrier.scale
     room_m = float(grip[2]) - carrier.ground_m

@@ -39,13 +39,13 @@ def layers(person: Person) -> tuple[Layer, ...]:
 
 
 def displace_layer(body: BodyTemplate, layer: Layer, points_m: Array, rng: VariantRng) -> Surface:
-    """One layer on a body that is not posed yet.
+    """One layer on an unposed body.
 
     Args:
         body: The template.
-        layer: What to make.
+        layer: Layer to make.
         points_m: The template in the person's shape [m], shape [points, 3].
-        rng: Of its wrinkles and tufts.
+        rng: Draws its wrinkles and tufts.
     """
     phases = 2.0 * math.pi * np.array([rng.random() for _ in range(_WAVES)])
     used, faces, slots, border = _topology(body, tuple(z for z, _ in layer.zones), layer.keeps)

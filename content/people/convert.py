@@ -138,7 +138,7 @@ def _curtain(base: _Base) -> MeshRows:
 
 
 def _span_legs(base: _Base, rows: MeshRows) -> MeshRows:
-    """Let the middle of a skirt follow both legs, so that it does not part between them."""
+    """Let the middle of a skirt follow both legs: it must not part between them."""
     first = 3 + 3 * len(base.targets)
     left, right = (first + list(base.bones).index(f"thigh_{side}") for side in "lr")
     values = rows.values.copy()
@@ -211,7 +211,7 @@ def _file(name: str) -> str:
 
 
 def _read_shape(folder: Path, name: str, count: int) -> Array:
-    """What a shape adds to the positions [m], float64 [n, 3]."""
+    """Displacement of the positions by a shape [m], float64 [n, 3]."""
     files = FACES.get(name, {_file(name): 1.0})
     return sum(
         (share * _read_target(folder / file, count) for file, share in files.items()),

@@ -15,13 +15,13 @@ _HEAD_RADIUS_M = 0.09
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Surface:
-    """A sheet on a body that is not posed yet.
+    """A sheet on an unposed body.
 
     Attributes:
         used: Point of the body that each vertex moves with, [n]; several may share one.
         places_m: Vertices in the person's shape [m], [n, 3].
         template_m: Vertices in the template frame [m], [n, 3].
-        normals: Of the body under the vertices, [n, 3].
+        normals: Normals of the body under the vertices, [n, 3].
         faces: Triangles, [m, 3].
         slots: Material of each triangle, [m].
     """

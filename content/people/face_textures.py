@@ -1,7 +1,7 @@
 """Textures of faces and eyes.
 
-A face is drawn on a light ground, so that the material's colour is that of the skin. Its features
-lie where the template body has them, in the coordinates of ``head_layout`` [m].
+A face is drawn on a light ground; the material's colour is the skin colour. Its features have the
+positions of the template body's, in the coordinates of ``head_layout`` [m].
 """
 
 from collections.abc import Sequence
@@ -142,7 +142,7 @@ def _flush() -> Float32:
 
 
 def _hollows() -> Float32:
-    """Shade of the eye sockets, beside the nose, under the lower lip and the chin."""
+    """Shade of the eye sockets, at the sides of the nose, under the lower lip and the chin."""
     sockets = 0.07 * _spot(0.024, 0.735, 0.014, 0.013) + 0.08 * _spot(0.033, 0.72, 0.02, 0.008)
     wings = 0.3 * _stroke(_NOSTRIL_WING, 0.0016)
     lip = 0.13 * _spot(0.0, 0.6465, 0.014, 0.0035)
@@ -203,7 +203,7 @@ def _dark_lines(kind: person.FaceKind) -> Float32:
 
 
 def _age_lines(age: float, rng: VariantRng) -> tuple[Float32, Float32]:
-    """Darkness and depth of folds: beside the mouth, under the eyes, on the forehead."""
+    """Darkness and depth of folds: at the mouth, under the eyes, on the forehead."""
     bend = 0.002 * _noise((5, 9), 1, rng)
     folds = 1.0 * _stroke(_NASOLABIAL, 0.0022) + 0.7 * _stroke(_BAG, 0.0018)
     forehead = np.exp(-((((_Z_M + bend - 0.765) % 0.0095 - 0.00475) / 0.0013) ** 2))

@@ -1,10 +1,10 @@
-"""Where garments lie on their textures.
+"""Placement of garments on their textures.
 
 A garment texture covers a square of ``TILE_M`` and has three fields side by side: the front of
 the trunk, one limb, the back of the trunk. Trunk coordinates unroll a cylinder about the spine;
-those of a limb run from its middle line to the opposite side and back, so that no seam needs a cut
-there. Both sleeves and both legs share the limb's field. Coordinates are those of
-the template frame [m].
+limb coordinates run from the limb's middle line to the opposite side and back, which avoids a cut
+along a seam. Both sleeves and both legs share the limb's field. Coordinates are in the template
+frame [m].
 """
 
 import math

@@ -1,8 +1,8 @@
 """Textures of garments: folds, seams, washing, patterns and prints.
 
-Plain cloth is light grey, so that the material's colour is the garment's; patterned and printed
-cloth has its own colours. Folds are drawn where cloth is compressed or pulled: below the armpits,
-at waist, elbows, crotch and knees, and above the shoes. ``garment_layout`` maps them to bodies.
+Plain cloth is light grey, and the material has the garment's colour; patterned and printed cloth
+has its own colours. Folds are drawn where cloth is compressed or pulled: below the armpits, at
+waist, elbows, crotch and knees, and above the shoes. ``garment_layout`` maps them to bodies.
 """
 
 import numpy as np

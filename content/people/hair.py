@@ -20,7 +20,7 @@ class _Cut:
 
     Attributes:
         thick_m: Thickness at the top; the sides have less.
-        folds_m, waves_per_m: Of its locks.
+        folds_m, waves_per_m: Depth and frequency of its locks.
         fringe_m, sides_m, nape_m: Lengths of locks on the forehead, before the ears, behind.
         side_part: Whether the hair is parted at the left.
         fade: Share of the thickness at the sides.

@@ -1,7 +1,7 @@
-"""Where faces, eyes and hair lie on their textures. Coordinates are those of the template [m].
+"""Placement of faces, eyes and hair on their textures, in coordinates of the template [m].
 
 Heads are unrolled about an upright axis, and both halves share one field: no seam needs a cut.
-Heights run along the texture, because faces are higher than half of one is wide.
+Heights run along the texture, because a face is taller than half its width.
 """
 
 import numpy as np

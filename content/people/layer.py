@@ -18,11 +18,11 @@ class Layer:
 
     Attributes:
         zones: Each zone and its material.
-        profile: How far the sheet stands off the template.
+        profile: Distance of the sheet from the template.
         folds_m: Height of its wrinkles.
-        waves_per_m: Of the wrinkles.
+        waves_per_m: Frequency of the wrinkles.
         tapered: Whether the sheet's edge lies on the body (hair).
-        smoothings: How often the sheet is smoothed: cloth spans hollows.
+        smoothings: Number of smoothing passes: cloth spans hollows.
         mapped: Whether its materials have garment textures (``garment_layout``).
         layout: Texture coordinates [n, 2] of a sheet without seams; None = ``mapped`` decides.
         relief: Factor on the distance from the body; None = 1.

@@ -59,12 +59,13 @@ class Outfit:
     Attributes:
         top: ``tshirt``, ``shirt``, ``jacket``, ``coat`` or ``dress``.
         bottom: ``trousers``, ``shorts``, ``skirt`` or, under a dress, ``none``.
-        skirt_zones: How many of the skirt's three zones skirt, dress or coat reach down to.
+        skirt_zones: Number of the skirt's three zones that the skirt, dress or coat covers, from
+            the top.
         bag: ``""``, ``backpack``, ``handbag``, ``shoulder_bag``, ``shopping`` (a carrier bag in one
             hand) or ``shopping_both``.
-        front_material: Of the chest, where an open jacket shows a shirt.
+        front_material: Material of the chest, where an open jacket shows a shirt.
         headwear: ``""``, ``beanie``, ``cap``, ``hood`` or ``headscarf``.
-        stockings: Whether legs that show are covered.
+        stockings: Whether bare legs are covered.
     """
 
     top: str
@@ -263,9 +264,9 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     """The person of a seed.
 
     Args:
-        seed: Of all properties that are not given.
+        seed: Seed of all properties that are not given.
         pose: One of ``POSES``; empty = drawn.
-        phase: Of the stride, in [0, 1), rounded to sixteenths; negative = drawn.
+        phase: Stride phase in [0, 1), rounded to sixteenths; negative = drawn.
 
     Raises:
         ValueError: if the pose does not exist or the phase is not finite.
@@ -437,12 +438,12 @@ _CHILD_RUNS = 6
 
 
 def _drawn_action(seed: int, age_group: AgeGroup, pose: str, phase: float) -> tuple[str, int]:
-    """Pose and step; they have a stream of their own, so that the same person can do anything."""
+    """Pose and step, drawn from a separate stream: any pose suits the same person."""
     rng = variant_rng("person/pose", seed)
     drawn = rng.choose(_pose_lots(age_group))
     step = rng.choose(range(PHASES))
     if not math.isfinite(phase):
-        raise ValueError("phase is no number")
+        raise ValueError("phase is not a number")
     if phase >= 0.0:
         step = round(phase * PHASES) % PHASES
     return pose or drawn, step

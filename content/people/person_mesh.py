@@ -20,9 +20,9 @@ from gen_data.core.asset_types import ConvexParts, Float32, Keypoint, Material, 
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
 _GRID_M = 1e-5
-"""Vertices lie on this grid, so that the last bits of sines do not reach the mesh."""
+"""Grid of the vertices [m]: the last bits of sines must not reach the mesh."""
 _NARROW_STRIDE = 0.7
-"""What a long skirt leaves of a stride."""
+"""Factor on the stride under a long skirt."""
 _HULL_POINTS = 40
 
 KEYPOINTS = load_table(__package__, "keypoints", tuple[str, float])

@@ -1,9 +1,9 @@
 """Poses of people who walk, run, stand or sit: joint angles, bone rotations, points that move.
 
-Angles of ``poses.yaml`` and ``gaits.yaml`` are degrees, as in the tables of gait analysis: hip and
+Angles of ``poses.yaml`` and ``gaits.yaml`` are in degrees, as in tables of gait analysis: hip and
 knee flexion, ankle dorsiflexion and shoulder flexion (arm forward) are positive. Limbs take their
-direction from them, independent of the template's own pose: a bone is first turned so that it hangs
-straight down and then swung from there. Linear blend skinning: Magnenat-Thalmann, Laperrière and
+direction from them, independent of the template's own pose: a bone is first turned until it hangs
+straight down, and then swung from there. Linear blend skinning: Magnenat-Thalmann, Laperrière and
 Thalmann, "Joint-dependent local deformations for hand animation and object grasping", Graphics
 Interface 1988.
 """
@@ -45,8 +45,8 @@ class Arm:
         swing: Upper arm forward.
         out: Upper arm away from the body.
         elbow: Flexion.
-        inward: How far the forearm turns to the body's middle.
-        curl: Of each finger joint.
+        inward: Rotation of the forearm towards the body's middle.
+        curl: Flexion of each finger joint.
     """
 
     swing: float = 0.0
@@ -105,10 +105,10 @@ class _Pose:
     Attributes:
         gait: Row of ``gaits.yaml`` that moves legs and arms; empty = the pose stands or sits.
         stride, swing: Factors on the gait's hip angles and on its swing of the arms.
-        leg, arm: Of both sides; of a gait, ``arm`` is what its arms swing about.
-        right_leg, left_arm, right_arm: Of one side, in place of the pose's or the gait's.
-        held: Thing in the hands, see ``carried_things``; empty = none.
-        share: How often it is drawn.
+        leg, arm: Angles of both sides; in a gait, arms swing about ``arm``.
+        right_leg, left_arm, right_arm: Angles of one side, which replace the pose's or gait's.
+        held: Item in the hands, see ``carried_things``; empty = none.
+        share: Relative frequency with which it is drawn.
     """
 
     behaviour: str
@@ -232,13 +232,13 @@ def skin_points(points_m: Array, bones: Indices, weights: Array, transforms: Arr
     """Points moved by their bones.
 
     Args:
-        points_m: Before the pose [m], shape [n, 3].
-        bones: Of each point, shape [n, 4].
-        weights: Shares of those bones, shape [n, 4].
-        transforms: Of every bone, shape [bones, 3, 4].
+        points_m: Positions before the pose [m], shape [n, 3].
+        bones: Bones of each point, shape [n, 4].
+        weights: Shares of these bones, shape [n, 4].
+        transforms: Transforms of all bones, shape [bones, 3, 4].
 
     Returns:
-        After the pose [m], float64 [n, 3].
+        Positions after the pose [m], float64 [n, 3].
     """
     # Entries of matrices as rows: NumPy is slow along short axes.
     flat = np.ascontiguousarray(transforms.reshape(len(transforms), 12).T)
@@ -274,11 +274,11 @@ _CASCADE = {"index": 0.8, "middle": 1.0, "ring": 1.15, "pinky": 1.3}
 """Shares of the fingers in a curl: in a hand at rest flexion rises from index to little finger (the
 "cascade" of hand surgery; shares assumed)."""
 _SPREAD, _THUMB_SPREAD = 0.25, 0.6
-"""What remains of the angles between the template's fingers, and of its thumb's (assumed)."""
+"""Factors on the angles between the template's fingers, and on its thumb's (assumed)."""
 _THUMB = (0.4, 0.6, 0.9)
 """How far the bones of a thumb turn before and across the palm, per radian of curl (assumed)."""
 _STANCE_IN_DEG = 3.0
-"""Thighs lean inward, so that the feet are nearer to each other than the hips."""
+"""Thighs lean inward: the feet are closer together than the hips."""
 _TOES_OUT_DEG = 6.0
 
 
@@ -315,7 +315,7 @@ def bone_rotations(body: BodyTemplate, heads_m: Array, stance: Stance) -> Rotati
 
 
 def _pelvic_drop_deg(body: BodyTemplate, heads_m: Array, stance: Stance) -> float:
-    """How far the pelvis drops to the side of the shorter leg, so that both ankles are level."""
+    """Drop of the pelvis to the side of the shorter leg that makes both ankles level."""
     heights = []
     for side, sign, leg in (("l", 1.0, stance.left_leg), ("r", -1.0, stance.right_leg)):
         rotations = _leg(body, heads_m, side, sign, leg)

@@ -1,8 +1,8 @@
-"""Shoes: where they lie on their textures, and what those show.
+"""Shoes: their placement on textures, and the images of these textures.
 
 A shoe is unrolled about a level axis just above the sole, which ends before heel and toe: columns
-are the way along the foot, rows the angle from straight up (the texture's lower edge) to the sole,
-then the way down its rim. Both sides share one field, so that there is no seam.
+are the distance along the foot, rows the angle from straight up (the texture's lower edge) to the
+sole, then the distance down its rim. Both sides share one field, without a seam.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Bottles and jars: bodies of revolution with a label, a closure and what is in them.
+"""Bottles and jars: bodies of revolution with a label, a closure and contents.
 
 Kinds of bottles are rows of ``bottles.yaml``.
 """
@@ -35,17 +35,17 @@ _SEGMENTS = 40
 
 @dataclass(frozen=True, slots=True)
 class BottleStyle:
-    """Ranges of the measures of one kind of bottle.
+    """Ranges of the dimensions of one kind of bottle.
 
     Attributes:
-        height_m: Without a pump or trigger.
+        height_m: Height without a pump or trigger.
         label_share: Lower and upper edge of the label, as shares of the height.
         shoulder: (radius as a share of the body's beyond the neck's, height as a share of the way
             from label to neck) of the points between body and neck.
         cap_m: Radius and height of the cap.
-        depth: Extent along Y as a share of that along X.
-        colors: Of the body; of a clear bottle, the tint of light that has passed through it.
-        caps: Of the cap.
+        depth: Extent along Y divided by extent along X.
+        colors: Colours of the body; of a clear bottle, the tint of transmitted light.
+        caps: Colours of the cap.
         clear: Whether it is transparent; then it contains one of ``drinks``.
         fill: Level of the drink as a share of the height below the neck's end.
         closures: ``screw``, ``crown``, ``pump``, ``trigger``, ``nozzle`` or ``spout``.
@@ -75,7 +75,7 @@ class BottleStyle:
 
 
 class BottleChoice(NamedTuple):
-    """What a bottle has drawn from the options of its kind; see ``BottleStyle``."""
+    """Draws of one bottle from the options of its kind; see ``BottleStyle``."""
 
     kind: str
     drink: str
@@ -98,7 +98,7 @@ def choose_bottle(seed: int) -> BottleChoice:
 
 
 def bottle_facts(seed: int) -> Facts:
-    """Kind, and what shows through a clear wall."""
+    """Kind, and the contents visible through a clear wall."""
     choice = choose_bottle(seed)
     return Facts(choice.kind, {"contents": choice.drink} if choice.drink else {})
 
@@ -150,10 +150,10 @@ class _Dents(NamedTuple):
     """Dents in a wall about Z.
 
     Attributes:
-        places: Of each dent, angle about Z [rad] and height [m].
-        depths: Shares of the radius by which the wall gives way.
+        places: Angle about Z [rad] and height [m] of each dent.
+        depths: Depths as shares of the radius.
         widths: Half widths, an angle [rad] and a height [m].
-        between_m: Lowest and highest points that give way.
+        between_m: Heights of the lowest and highest points that move.
     """
 
     places: Array
@@ -247,10 +247,10 @@ class _Wall(NamedTuple):
     """Outside of a bottle or jar.
 
     Attributes:
-        radius: Of the body [m].
+        radius: Radius of the body [m].
         label: Heights of the label's edges [m].
-        upper: Points of (radius, z) above the body [m].
-        radii: Of the arcs at these points, but for the last [m].
+        upper: Points (radius, z) above the body [m].
+        radii: Radii of the arcs at these points, except the last [m].
     """
 
     radius: float
@@ -327,7 +327,7 @@ def _front_label(radius: float, low: float, high: float) -> Patch:
 
 
 def _contents(wall: _Wall, level: float, *, fine: bool = False) -> Patch:
-    """What is in a bottle, up to a level; slot 3."""
+    """Contents of a bottle up to a level; slot 3."""
     profile = [(r, z) for r, z in wall.profile() if r > 0.5 * wall.radius or z > 0.02]
     low = 0.006
     between = [(r, z) for r, z in profile if low < z < level - 5e-4]

@@ -47,7 +47,7 @@ def wedges(
     """A convex cross-section of (radius, z) turned about Z, cut into ``count`` wedges.
 
     Points whose radius is in ``round_at``, or the largest, have a third vertex between the two
-    cuts, so that the outside is rounder.
+    cuts, which makes the outside rounder.
     """
     half = math.pi / count
     rounded = {max(radius for radius, _ in profile), *round_at}

@@ -30,7 +30,7 @@ def crate(size_m: Vec3 = (0.5, 0.34, 0.2), seed: int = 0) -> Solid:
 
     Args:
         size_m: Outer length, width, height.
-        seed: Of its wood, or of its plastic.
+        seed: Seed of its wood or plastic.
     """
     boxes = _crate_boxes(check_size("open_crate", size_m, 0.06))
     patches = [shapes.map_along_grain(shapes.block(*b, 0.0015), 0.5) for b in boxes]
@@ -74,7 +74,7 @@ def bowl(size_m: Vec3 = (0.28, 0.28, 0.09), seed: int = 0) -> Solid:
 
     Args:
         size_m: Diameter, twice, and height.
-        seed: Of its wood, or of its glaze.
+        seed: Seed of its wood or glaze.
     """
     x, y, z = check_size("serving_bowl", size_m, 0.04)
     r, t = 0.5 * min(x, y), 0.006
@@ -121,7 +121,7 @@ def market_stand(size_m: Vec3 = (0.9, 0.8, 0.6), seed: int = 0) -> Solid:
 
     Args:
         size_m: Length, depth and height.
-        seed: Of the crates' wood or plastic.
+        seed: Seed of the crates' wood or plastic.
     """
     size_m = check_size("market_stand", size_m, 0.3)
     patches, parts = [], []
@@ -161,7 +161,7 @@ def shopping_bag(size_m: Vec3 = (0.36, 0.2, 0.22), seed: int = 0) -> Solid:
 
     Args:
         size_m: Length, width and height of its wall.
-        seed: Of its creases and material.
+        seed: Seed of its creases and material.
     """
     x, y, z = check_size("shopping_bag", size_m, 0.1)
     rng = variant_rng("shopping_bag", seed)
@@ -234,7 +234,7 @@ def sink(size_m: Vec3 = (1.2, 0.6, 0.2), seed: int = 0) -> Solid:
 
     Args:
         size_m: Length, depth, and height of the worktop above its support.
-        seed: Of the worktop and of the basin's steel or glaze.
+        seed: Seed of the worktop and of the basin's steel or glaze.
     """
     x, y, z = check_size("sink", size_m, 0.12)
     (length, width), rng = _BASIN_M, variant_rng("sink", seed)

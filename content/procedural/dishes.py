@@ -1,6 +1,6 @@
 """Prepared food on tables and plates: sandwiches, pizzas, cakes, donuts, hot dogs.
 
-Measures are those that shops and recipes state (assumed, within 15 %).
+Dimensions as stated by shops and recipes (assumed, within 15 %).
 """
 
 import math

@@ -1,6 +1,6 @@
 """Telephones, remote controls, mice and keyboards, lying as they are used, along X.
 
-Sizes are those of common devices (assumed, within 8 %).
+Sizes of common devices (assumed, within 8 %).
 """
 
 import math

@@ -199,7 +199,7 @@ def _over_ground(sky: Array, d: Array, rng: VariantRng) -> Array:
     """The sky above the horizon, and ground below that reflects a fifth or so of its mean."""
     above = smoothstep(-0.01, 0.01, d[..., 2:])
     soil = np.array(hex_to_linear(rng.choose(("#8c8a84", "#7d7f73", "#94866f", "#8b9094"))))
-    # What lights the ground is the sky and a sun that is not in it: whiter than the sky.
+    # The ground is lit by the sky and by a sun outside the image: light whiter than the sky.
     mean = sky[: sky.shape[0] // 2].mean(axis=(0, 1))
     upper = 0.35 * mean + 0.65 * float(colorimetry.luminance(mean))
     ground = soil * upper * (1.0 - 0.25 * smoothstep(0.0, -1.0, d[..., 2:]))

@@ -128,7 +128,7 @@ def _draw_code(seed: int) -> Print:
 def _square(
     cells: NDArray[np.bool_], side_m: float, margin_cells: float, facts: dict[str, str]
 ) -> Print:
-    """A print of equal square cells; its corners are those of the cells, without the margin."""
+    """A print of equal square cells; its corners are corners of cells, without the margin."""
     edges = (np.arange(len(cells) + 1) / len(cells) - 0.5) * side_m
     a = 0.5 * side_m
     names = ("top_left", "top_right", "bottom_right", "bottom_left")
@@ -149,7 +149,7 @@ def _draw_board(seed: int) -> Print:
     name = rng.choose(enough, "dictionary")
     facts = {"pattern": pattern, "columns": str(columns), "rows": str(rows)}
     facts["square_m"] = f"{square_m:.6g}"
-    # Lines within a square, in units of its side: its own edge, and those of its marker's cells.
+    # Lines within a square, in units of its side: its edges, and edges of its marker's cells.
     lines, cells = np.zeros(1), 0
     if pattern == "charuco":
         facts |= {"dictionary": name, "marker_m": f"{share * square_m:.6g}"}
@@ -196,7 +196,7 @@ def _make_solid(flat: Print) -> Solid:
     around = [top[:-1, :-1], top[1:, :-1], top[1:, 1:], top[:-1, 1:]]
     slots = np.repeat(flat.dark.ravel().astype(np.int64), 2)
     patches = [replace(_quads(*(c.reshape(-1, 3) for c in around)), slots=slots)]
-    # The rim has all vertices of the print's border, so that the mesh has no gaps.
+    # The rim has all vertices of the print's border: the mesh must have no gaps.
     rim = np.concatenate([top[:-1, 0], top[-1, :-1], top[:0:-1, -1], top[0, :0:-1]])
     after, down_m = np.roll(rim, -1, axis=0), np.array([0.0, 0.0, low - high])
     patches.append(_quads(rim, rim + down_m, after + down_m, after))

@@ -1,4 +1,4 @@
-"""Things that arms work on: cabinets, drawers, doors, knobs, buttons, pegs and sockets.
+"""Objects of manipulation tasks: cabinets, drawers, doors, knobs, buttons, pegs and sockets.
 
 Origin on the floor, Z up. Parts that move have their handles towards -X; the joints belong to the
 tasks that use them. All builders raise AssetError for an unknown colour.
@@ -139,9 +139,9 @@ def hook_stand(height_m: float = 0.14, reach_m: float = 0.09, color: str = "grey
     """A post on a foot, and an arm towards -X whose end points up. Slots: foot, metal.
 
     Args:
-        height_m: Of the upper side of the arm; its end is 2.5 cm higher.
+        height_m: Height of the upper side of the arm; its end is 2.5 cm higher.
         reach_m: Distance of the end from the post.
-        color: One of ``COLORS``, of the foot.
+        color: Colour of the foot, one of ``COLORS``.
     """
     z, w = height_m, 0.006
     foot = ((-0.04, -0.05, 0.0), (0.06, 0.05, 0.012))

@@ -1,6 +1,6 @@
-"""Shapes that dishes and plates of food are made of: mounds, slices, leaves, crumbs and smears.
+"""Shapes of which dishes and plates of food consist: mounds, slices, leaves, crumbs and smears.
 
-Sizes are in metres. Every shape is closed, so that it may lie on, or reach into, another one.
+Sizes are in metres. Every shape is closed: it may lie on, or intersect, another one.
 """
 
 import math
@@ -55,7 +55,7 @@ def mound(
 
     Args:
         radius: Mean radius of its foot.
-        height: Of its middle.
+        height: Height of its middle.
         rng: Draws its outline.
         rough: Depth of its dents as a share of the radius.
         flat: Below 1 it is flatter on top and steeper at the side.
@@ -107,7 +107,7 @@ def sector(profile: Sequence[Point2], turn_rad: float, steps: int, slots: Point2
         profile: Outline of (radius, z), counter-clockwise in that plane, from the axis to the axis.
         turn_rad: Less than a whole turn.
         steps: Quads along the arc.
-        slots: Of the outside, and of the cut faces.
+        slots: Slots of the outside and of the cut faces.
     """
     outline = np.array(profile)
     turn = np.linspace(0.0, turn_rad, steps + 1)

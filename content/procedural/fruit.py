@@ -41,15 +41,15 @@ class FruitStyle:
     """Ranges of the shape of one kind of round fruit; depths are shares of the radius.
 
     Attributes:
-        slim: Half the height over the radius.
+        slim: Half the height divided by the radius.
         dent_top, dent_low: Depths of the hollows of stalk and blossom.
         dent_width: Their width: 0.02 narrow, 0.14 wide.
-        taper: How much narrower it is below.
-        tip_top, tip_low: How far the ends are drawn out.
+        taper: Relative narrowing towards the bottom.
+        tip_top, tip_low: Elongation of the ends.
         lobes, lobe_depth: Number and depth of furrows from end to end.
         cleft: Depth of a single furrow.
         lumps: Depth of irregular swellings.
-        skin: Texture: a family of its own, or a kind of ``fruit_skin``.
+        skin: Texture: a separate family, or a kind of ``fruit_skin``.
         skin_first: Seed of the texture of the first variant.
         stalk: ``twig``, ``button``, ``calyx``, ``stump``, ``crown`` or empty.
         leaf: Probability of a leaf.
@@ -299,7 +299,7 @@ def banana(seed: int, piece: int = -1) -> Solid:
 
 
 def banana_pieces(seed: int, piece: int = -1) -> tuple[tuple[str, Vec3], ...]:
-    """Ids of the bananas of a hand, and their middles from that of the hand [m]."""
+    """Ids of the bananas of a hand, and their middles relative to the hand's middle [m]."""
     if piece >= 0 or banana_count(seed) == 1:
         return ()
     bananas, _ = _bananas(seed)
@@ -367,7 +367,7 @@ def _banana(length: float, thick: float, bend: float, count: int) -> tuple[Patch
     steps = 25
     arc = np.linspace(0.0, 1.0, steps)
     radius = length / bend
-    # The stem leaves at half of the bend upwards, so that both ends are level.
+    # The stem leaves at half of the bend upwards, which makes both ends level.
     angle = bend * (arc - 0.5)
     rise = radius * (np.cos(angle) - math.cos(0.5 * bend))
     path = np.stack([radius * (np.sin(angle) + math.sin(0.5 * bend)), rise, 0 * arc], axis=1)

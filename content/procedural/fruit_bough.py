@@ -79,7 +79,7 @@ def _limb(size_m: Vec3, rng: VariantRng) -> Array:
 
 
 def _leaves_around(hooks: Array, rng: VariantRng) -> Array:
-    """Feet of the leaves that grow beside fruit, from above to its middle, [n, 3]."""
+    """Feet of the leaves that grow next to fruit, from above to its middle, [n, 3]."""
     count = len(hooks) * _NEAR
     turn = 2.0 * math.pi * rng.random(count)
     reach = _FREE_M + 0.04 * rng.random(count)

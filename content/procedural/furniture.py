@@ -231,9 +231,9 @@ def light_panel(
     The lamp is dark until it is given an emission.
 
     Args:
-        size_m: Of the bright part; a disk has the first for its diameter.
+        size_m: Size of the bright part; the first is the diameter of a disk.
         shape: rectangle or disk.
-        depth_m: Of the housing, which is as wide as the panel.
+        depth_m: Depth of the housing, which is as wide as the panel.
     """
     x, y, z = check_size("light_panel", (*size_m[:2], depth_m), 0.005)
     check_option("light_panel", "shape", shape, PANEL_SHAPES)
@@ -351,7 +351,7 @@ def rounded_loop(half_x: float, half_y: float, radius: float, z: float) -> Array
 
 
 def _profile_bar(low: Vec3, high: Vec3) -> list[Patch]:
-    """An aluminium profile: four corner bars around a recessed core, so that its slots show."""
+    """An aluminium profile: four corner bars around a recessed core, which form its slots."""
     axis = max(range(3), key=lambda i: high[i] - low[i])
     sides = [i for i in range(3) if i != axis]
     made = []

@@ -5,8 +5,8 @@ Y towards the thumb of a right hand. Left hands are mirror images.
 
 Lengths between joints and the flesh beyond the last bones are means of 66 adults in Buryanov and
 Kotiuk, "Proportions of hand segments", Int. J. Morphol. 28(3), 2010, table I; the palm's breadth is
-that of Gordon et al., "2012 anthropometric survey of U.S. Army personnel", 2014 (means 79 mm of
-women, 88 mm of men). Thickness of fingers and places of the knuckles are assumed, within 10 %.
+from Gordon et al., "2012 anthropometric survey of U.S. Army personnel", 2014 (means 79 mm of women,
+88 mm of men). Thickness of fingers and places of the knuckles are assumed, within 10 %.
 """
 
 import math
@@ -27,7 +27,7 @@ from gen_data.content.procedural.patches import Array, Indices, Patch
 
 FINGERS = ("index", "middle", "ring", "little")
 Distance = Callable[[Array, Array], Array]
-"""Distances [m] of points (x, z) of a hand's plane X-Z from a section of what is held."""
+"""Distances [m] of points (x, z) in a hand's X-Z plane from a section of the held object."""
 # Knuckles, then bones with the flesh of the tip [m].
 _KNUCKLES = np.array([[0.0952, 0.0245, 0.0], [0.0926, 0.003, 0.0025], [0.0851, -0.0178, 0.001],
                       [0.0782, -0.0352, -0.004]])  # fmt: skip
@@ -76,8 +76,8 @@ class Bones(NamedTuple):
             [5, 4, 3].
         backs: Direction out of each finger's nail, shape [5, 3].
         arm: Direction from the wrist to the elbow.
-        held: Points on the axis of what is held, beside the index and the little finger, and the
-            radius [m] beside each of the four fingers; empty = nothing.
+        held: Points on the axis of the held object at the index and the little finger, and its
+            radius [m] at each of the four fingers; empty = nothing.
     """
 
     chains: Array
@@ -105,7 +105,7 @@ def grasp_bones(radii_m: Sequence[float], lift_deg: float) -> Bones:
     "GraspIt!", IEEE Robotics and Automation Magazine 11(4), 2004).
 
     Args:
-        radii_m: Radius of what is held beside index, middle, ring and little finger.
+        radii_m: Radius of the held object at index, middle, ring and little finger.
         lift_deg: Angle of the forearm towards the thumb's side.
     """
     # It lies in the palm below the knuckles; wide ones further back.
@@ -251,7 +251,7 @@ def _close(
 ) -> float:  # fmt: skip
     """The dip [rad] of a bone that bends from ``turn`` by up to ``limit`` until it touches.
 
-    ``reach``: radius around what is held, and of the flesh at both ends of the bone.
+    ``reach``: radius around the held object, and of the flesh at both ends of the bone.
     """
     turns = turn + limit * np.linspace(0.0, 1.0, 91)
     share = np.linspace(0.15, 1.0, 9)

@@ -1,7 +1,7 @@
-"""Hands with forearms that rest on tables, point, or hold things.
+"""Hands with forearms that rest on tables, point, or hold objects.
 
-The forearm runs towards -X. Hands that grasp have their thumb above, so that what they hold stands
-upright; the others have their palm below.
+The forearm runs towards -X. Grasping hands have their thumb above, and the held object is upright;
+the others have their palm below.
 """
 
 import math
@@ -31,7 +31,7 @@ from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 GRASP = "grasp"
 HOLD = "hold"
-"""Closed on something, by ``bends_deg``; its axes are those of the hand frame."""
+"""Closed on an object, by ``bends_deg``; its axes are the axes of the hand frame."""
 OPEN = "open"
 """Flat with the palm up, to receive something; the forearm's end is lower than the hand."""
 POSE_NAMES = ("relaxed", "flat", GRASP, "point", "pinch", "fist")
@@ -58,8 +58,8 @@ def hand(
     Args:
         seed: Draws size, skin, side and sleeve; with pose ``any`` also the pose.
         pose: One of ``POSE_NAMES``, ``open``, ``hold``, or ``any``, which is neither of the two.
-        radii_mm: For ``grasp``: radius of what is held beside index, middle, ring and little
-            finger; all 0 = drawn.
+        radii_mm: For ``grasp``: radius of the held object at index, middle, ring and little finger;
+            all 0 = drawn.
         bends_deg: For ``hold``: dips below the palm of the bones of index, middle, ring, little
             finger and thumb.
 
@@ -68,7 +68,7 @@ def hand(
         ValueError: if a radius is outside ``RADII_M``.
     """
     pose, rng = hand_pose(seed, pose), variant_rng("hand", seed)
-    # Beside what is held the hand has the size of the table, so that it fits.
+    # At a held object the hand has the tabulated size, which fits the radii.
     stout = rng.between(0.9, 1.04, "stout")
     size = 1.0 if pose in (GRASP, HOLD) else rng.between(0.9, 1.06, "size_scale")
     held = draw_radii(seed, radii_mm) if pose == GRASP else ()
@@ -96,12 +96,12 @@ def hand_pose(seed: int, pose: str = "any") -> str:
 
 
 def is_left(seed: int) -> bool:
-    """Whether it is a left hand; one in ten, as for what is held (assumed), else right."""
+    """Whether it is a left hand: one in ten hands that hold objects (assumed)."""
     return seed % 2 == 1
 
 
 def draw_radii(seed: int, radii_mm: Sequence[float]) -> tuple[float, ...]:
-    """Radii of what is held beside four fingers [m], as given or drawn.
+    """Radii of the held object at four fingers [m], as given or drawn.
 
     Raises:
         ValueError: if a radius is outside ``RADII_M``.
@@ -117,7 +117,7 @@ def draw_radii(seed: int, radii_mm: Sequence[float]) -> tuple[float, ...]:
 
 
 def held_axis_m(seed: int, radii_m: Sequence[float]) -> Vec3:
-    """From the keypoint ``index_1`` to the axis of what is held, at the height of ``index_1`` [m].
+    """Vector from the keypoint ``index_1`` to the axis of the held object, at its height [m].
 
     In the frame of the asset, whose Z is parallel to that axis.
     """
@@ -150,7 +150,7 @@ def _map_texture(flesh: Patch, bones: Bones, stout: float) -> tuple[Patch, Indic
     """Texture coordinates of the atlas of ``hand_skin``, and the part of each triangle.
 
     The left half of the image is the palm, its right half any finger; both sides of the hand share
-    it, so that no seam shows. Parts: 0 palm, then three bones per finger.
+    it, without a visible seam. Parts: 0 palm, then three bones per finger.
     """
     corners = flesh.corners_m
     middle = corners.mean(axis=1)
@@ -188,7 +188,7 @@ def _along_finger(points: Array, chain: Array, back: Array) -> tuple[Array, Arra
 
 
 def _hulls(skin: Patch, owner: Indices, nails: Sequence[Patch]) -> list[Array]:
-    """Convex parts of palm and bones; those of last bones enclose their nails."""
+    """Convex parts of palm and bones; parts of last bones enclose their nails."""
     made = []
     for part in sorted(set(owner.tolist())):
         points = skin.corners_m[owner == part].reshape(-1, 3)

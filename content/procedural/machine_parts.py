@@ -201,7 +201,7 @@ def flange(rng: VariantRng) -> Solid:
     holes = [circle(bore, 32)]
     for i in range(count):
         turn = 2 * math.pi * (i + 0.5) / count
-        # Turned a little, so that no three points of the triangulation are in line.
+        # Turned a little: no three points of the triangulation may be collinear.
         holes.append(circle(bolt, 12, (at * math.cos(turn), at * math.sin(turn)), 0.37 + 0.1 * i))
     disc = extrude(circle(radius, 56), thick, 0.0006, holes)
     neck, rise = 0.56 * radius, rng.between(0.3, 0.6) * radius
@@ -291,7 +291,7 @@ def _holed_plate(length: float, width: float, thick: float, hole: float) -> Patc
         for turn in (start + 0.5 * math.pi * i / 5 for i in range(6)):
             x, y = length - r, sign * (half - r)
             outline.append((x + r * math.cos(turn), y + r * math.sin(turn)))
-    # Turned a little, so that no three points of the triangulation are in line.
+    # Turned a little: no three points of the triangulation may be collinear.
     holes = [circle(hole, 14, (share * length, 0.0), share) for share in (0.42, 0.78)]
     return extrude(np.array(outline), thick, 0.12 * thick, holes)
 

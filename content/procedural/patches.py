@@ -21,8 +21,8 @@ from gen_data.core.se3 import Vec3
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Vertices nearer than this are one vertex, and vertices are stored on this grid, so that the last
-# bits of sine and cosine, which differ between processors, do not reach the mesh.
+# Vertices nearer than this are one vertex, and vertices are stored on this grid: the last bits of
+# sine and cosine, which differ between processors, do not reach the mesh.
 GRID_M = 1e-6
 CREASE_DEG = 38.0
 
@@ -111,7 +111,7 @@ def make_centred_solid(
 def centre_m(patch: Patch) -> Vec3:
     """Centre of a patch's bounding box [m].
 
-    On the vertex grid, so that a shift by it does not change which vertices coincide.
+    It lies on the vertex grid: a shift by it does not change which vertices coincide.
     """
     low, high = patch.bounds_m()
     x, y, z = (round(float(v) / GRID_M) * GRID_M for v in round_values(0.5 * (low + high)))
@@ -183,8 +183,8 @@ def _corner_normals(vertex: Indices, corners: Array, crease_deg: float) -> Array
     """Unit normal per corner: the mean over the faces at its vertex that meet without a crease.
 
     Weighted by the angle of each face at the vertex (Thürmer and Wüthrich, "Computing vertex
-    normals from polygonal facets", J. Graphics Tools 3(1), 1998) and by its area, so that a flat
-    face stays flat next to a small bevel.
+    normals from polygonal facets", J. Graphics Tools 3(1), 1998) and by its area, which keeps a
+    flat face flat next to a small bevel.
     """
     cross = triangle_soup.face_crosses(corners)
     x, y, z = unit(cross).T

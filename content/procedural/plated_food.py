@@ -1,4 +1,4 @@
-"""Meals on plates: freshly served, or what is left of them.
+"""Meals on plates: freshly served, or leftovers.
 
 Sizes of portions are assumed from cookbooks, within 25 %; a meal is scaled to its plate.
 """
@@ -39,8 +39,8 @@ def serve(name: str, seed: int, radius: float, slot: int, rng: VariantRng) -> Di
 
     Args:
         name: One of the meals.
-        seed: Of its textures.
-        radius: Of the plate's well [m]; the meal is scaled to fit.
+        seed: Seed of its textures.
+        radius: Radius of the plate's well [m]; the meal is scaled to fit.
         slot: First material slot that is free.
         rng: Draws everything else.
     """

@@ -19,8 +19,8 @@ _TWIG = ("#7a7a3a", "#6b5a34", "#8a8a4a")
 def grapes(rng: VariantRng) -> Solid:
     """A bunch of 30 to 80 grapes lying along X, its stalk towards +X. Slots: skins, stalk.
 
-    Berries are 15 mm to 23 mm thick, bunches 0.1 m to 0.19 m long (assumed, within 10 % of what
-    shops sell).
+    Berries are 15 mm to 23 mm thick, bunches 0.1 m to 0.19 m long (assumed, within 10 % of fruit on
+    sale).
     """
     count = grape_count(rng.seed)
     thick = rng.between(0.0075, 0.0115, "berry_radius_m")

@@ -20,7 +20,7 @@ UvRect = tuple[float, float, float, float]
 WHOLE_IMAGE: UvRect = (0.0, 0.0, 1.0, 1.0)
 _GRIDS_KEPT = 256
 
-# Face of a box: (outward axis, image right, image up), so that right x up = outward.
+# Face of a box: (outward axis, image right, image up), with right x up = outward.
 BOX_FACES: Mapping[str, tuple[Vec3, Vec3, Vec3]] = {
     "front": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
     "back": ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -349,7 +349,7 @@ def _cap(loops: Sequence[Array], z: float, slot: int) -> Patch:
 def triangulate(outline: Array, holes: Sequence[Array] = ()) -> Array:
     """Triangles, shape [n, 3, 2], of a counter-clockwise polygon with holes.
 
-    Their corners are the given points, all of them, so that walls and caps weld.
+    Their corners are exactly the given points: walls and caps weld.
 
     Raises:
         ValueError: if the polygon crosses itself, or a hole lies outside its outline.

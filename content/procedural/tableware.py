@@ -65,7 +65,7 @@ class Handle:
     wide_m: Point2
 
 
-# Food keeps this distance from a plate, so that surfaces do not coincide.
+# Food keeps this distance from a plate: surfaces must not coincide.
 _ON_PLATE_M = 0.0001
 # Limit on the convex parts of an object.
 _PARTS_MAX = 24
@@ -73,7 +73,7 @@ HANDLES: Mapping[str, Handle] = load_table(__package__, "handles", Handle)
 
 
 def vessel_symmetries(group: str, seed: int) -> tuple[Symmetry, ...]:
-    """Any turn about Z, or those of its flat sides; none where a handle or a print shows it."""
+    """Any turn about Z, or turns of its flat sides; none where a handle or a print shows it."""
     choice = vessels.choose(group, seed)
     lopsided = choice.handle or choice.decor not in ("plain", "bands", "rim") or choice.straw
     if lopsided or choice.content in _UNEVEN or choice.finish == "wood":
@@ -151,7 +151,7 @@ def _wall_materials(choice: Choice, seed: int, rng: VariantRng) -> tuple[Materia
 
 
 def _grip_material(choice: Choice, seed: int, walls: list[Material]) -> Material:
-    """Of the wall's glaze: that under a pattern, seldom that of the inside."""
+    """Colour of the wall's glaze: the one under a pattern, seldom the one of the inside."""
     if choice.decor == "plain":
         return walls[0]
     if variant_rng("handle", seed).chance(0.1):

@@ -16,8 +16,8 @@ from gen_data.core.asset_types import Material
 from gen_data.core.variant_rng import VariantRng
 
 CONTENTS = "contents"
-"""Role of the slots of what is in vessels and is no obstacle in physics."""
-# Contents keep this distance from walls, so that surfaces do not coincide.
+"""Role of the slots of contents of vessels; contents are not obstacles in physics."""
+# Contents keep this distance from walls: surfaces must not coincide.
 _GAP_M = 0.0003
 _WATER_IOR, _ICE_IOR = 1.33, 1.31
 
@@ -71,9 +71,9 @@ def fill(
         content: Name of a drink or food; empty = nothing.
         walls: The vessel.
         level: Level between floor and rim, as a share.
-        rng: Draws colours, ice, and places of pieces.
+        rng: Draws colours, ice, and positions of pieces.
         slot: First material slot that is free.
-        see_through: Whether the wall is transparent, so that the sides of a drink show.
+        see_through: Whether the wall is transparent and the sides of a drink are visible.
     """
     if not content:
         return Filling([], [], [], 0.0)

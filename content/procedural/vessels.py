@@ -32,17 +32,17 @@ _PLAIN_FINISHES = (
 
 @dataclass(frozen=True, slots=True)
 class VesselStyle:
-    """Ranges of the measures of one kind of vessel, and options of which each variant draws one.
+    """Ranges of the dimensions of one kind of vessel, and options of which each variant draws one.
 
     Attributes:
-        radius_m: Of the outer wall where ``outline`` is 1.
+        radius_m: Radius of the outer wall where ``outline`` is 1.
         outline: Outer wall from foot to rim: radius and height as shares.
         corner: Radius of the arcs at the points of the outline, as a share of the radius.
         floor_m: Thickness of the floor.
         floor_share: Height of the floor as a share of the height, of vessels on a stem; else 0.
-        finishes: What it is made of.
+        finishes: Materials.
         decors: Patterns of its outside; only of ceramics and paper.
-        contents: What is in it; empty = nothing.
+        contents: Names of drinks or food in it; empty = nothing.
         fill: Level of the contents between floor and rim.
         facets: Number of flat sides of the outer wall; 0 = round.
         lid, sleeve, straw, saucer: Probabilities of these parts.
@@ -68,7 +68,7 @@ class VesselStyle:
 
 
 class Choice(NamedTuple):
-    """What a variant has drawn from the options of its kind; see ``VesselStyle``."""
+    """Draws of a variant from the options of its kind; see ``VesselStyle``."""
 
     kind: str
     handle: str
@@ -155,7 +155,7 @@ def _inner_profile(outer: Array, wall: float, floor: float) -> list[Point2]:
         rim.append(outer[-1] + 0.5 * wall * ((1.0 - c) * inward[-1] + s * step[-1]))
     kept = [moved[-1]]
     for point in moved[-2::-1]:
-        # Offsets of tight corners cross each other: keep what goes down and stays off the axis.
+        # Offsets of tight corners cross each other: keep points that descend and stay off the axis.
         if floor < point[1] < kept[-1][1] - 1e-4 and point[0] > 0.002:
             kept.append(point)
     (r1, z1), near = kept[-1], 0.86 * kept[-1][0]
@@ -246,7 +246,7 @@ def solid_hulls(walls: Walls) -> list[Array]:
 
 
 def _simplify(profile: Sequence[Point2], count: int) -> list[Point2]:
-    """At most ``count`` points with the ends, those that keep the shape best (Douglas-Peucker)."""
+    """At most ``count`` points, ends included, that best keep the shape (Douglas-Peucker)."""
     kept = [0, len(profile) - 1]
     p = np.array(profile)
     while len(kept) < min(count, len(profile)):
@@ -255,7 +255,7 @@ def _simplify(profile: Sequence[Point2], count: int) -> list[Point2]:
             if j == i + 1:
                 continue
             along = unit((p[j] - p[i])[None])[0]
-            # Without the ends, which rounding may place beside the line between them.
+            # Without the ends, which rounding may place off the line between them.
             away = p[i + 1 : j] - p[i]
             off = np.abs(away[:, 1] * along[0] - away[:, 0] * along[1])
             if float(off.max()) > worst:

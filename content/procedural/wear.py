@@ -18,9 +18,9 @@ from gen_data.core.se3 import Vec3
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
 # Exponent on a uniform draw: half of all variants are worn by less than 0.29, a tenth by more
-# than 0.83 (assumed: most things at home are used a little).
+# than 0.83 (assumed: most household objects are used a little).
 _SKEW = 1.8
-# Roughness of a worn-out surface over that of a new one, minus 1 (assumed, within a half).
+# Relative increase of roughness of a worn-out surface over a new one (assumed, within a half).
 _DULLING = 0.8
 COARSE, MEDIUM, FINE = 6, 24, 64
 """Cells of noise per image."""
@@ -28,19 +28,19 @@ Size = tuple[int, int]
 
 
 class Film(NamedTuple):
-    """What covers a surface: a share per pixel, uint8, and its colour, sRGB in [0, 1]."""
+    """Deposit on a surface: a share per pixel, uint8, and its colour, sRGB in [0, 1]."""
 
     share: UInt8
     color: Vec3
 
 
 def draw_wear(name: str, seed: int) -> float:
-    """Wear of a variant, from 0 (new) to 1 (well used); a stream of its own for each name."""
+    """Wear of a variant, from 0 (new) to 1 (well used); a separate stream for each name."""
     return skewed(float(variant_rng(f"{name}/wear", seed).random()))
 
 
 def skewed(quantile: float) -> float:
-    """Wear of the thing below which a share ``quantile`` of all things are."""
+    """Wear that a share ``quantile`` of all objects do not exceed."""
     return float(quantile**_SKEW)
 
 
@@ -91,9 +91,9 @@ def scratches(count: int, length_px: float, size_px: Size, rng: VariantRng, lean
 
     Args:
         count: Number of strokes.
-        length_px: Of the longest.
+        length_px: Length of the longest.
         size_px: Height and width of the image.
-        rng: Draws their places.
+        rng: Draws their positions.
         lean: Spread of their directions about a drawn one, as a share of a half turn; 1 = any.
     """
     from PIL.Image import new

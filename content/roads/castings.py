@@ -98,7 +98,7 @@ def _line(x: Float32, at: float, half: float) -> Float32:
 
 
 def _iron(raised: Float32, grit: Float32, open_: Float32) -> Float32:
-    """Cast iron [n, n, 3]: traffic polishes what is raised, dirt fills the rest."""
+    """Cast iron [n, n, 3]: traffic polishes raised parts, dirt fills the rest."""
     level = (0.27 + 0.1 * raised + 0.03 * grit) * (1.0 - 0.85 * open_)
     albedo: Float32 = (level[..., None] * color("#fff4e6")).astype(np.float32)
     return albedo

@@ -32,7 +32,7 @@ def crop(seed: int, kind: str = "maize") -> TextureData:
     """A field from above; 6 m per repeat.
 
     Args:
-        seed: Of everything drawn.
+        seed: Seed of all draws.
         kind: A word of ``CROPS``.
 
     Raises:
@@ -70,7 +70,7 @@ def crop_edge(seed: int, kind: str = "maize") -> TextureData:
     The crop stands in the lower half of the image, and upside down in the upper one.
 
     Args:
-        seed: Of everything drawn.
+        seed: Seed of all draws.
         kind: A word of ``CROPS``.
 
     Raises:

@@ -21,7 +21,7 @@ rows."""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Deck:
-    """A reference line with a cross section that is made of straight pieces.
+    """A reference line with a cross section of straight segments.
 
     Attributes:
         line: The reference line.
@@ -30,8 +30,8 @@ class Deck:
         rows_m: Arc lengths of the rows of its mesh, rising.
         slots: Number of each material slot by name.
 
-    Rows of the mesh lie at the same arc lengths for all strips and patches, so that neighbours
-    share their vertices on bends.
+    Rows of the mesh lie at the same arc lengths for all strips and patches: neighbours share their
+    vertices on bends.
     """
 
     line: ReferenceLine
@@ -53,7 +53,7 @@ class Deck:
         return np.concatenate([[start_m], inside, [end_m]])
 
     def columns_between(self, low_m: float, high_m: float) -> tuple[float, ...]:
-        """Both distances and the deck's columns between them, so that patches follow its ruts."""
+        """Both distances and the deck's columns between them, for patches that follow its ruts."""
         # Columns next to an end would make slivers.
         inside = self.t_m[(self.t_m > low_m + 1e-4) & (self.t_m < high_m - 1e-4)]
         return (low_m, *(float(t) for t in inside), high_m)
@@ -70,7 +70,7 @@ class Deck:
     ) -> Patch:
         """A strip between two arc lengths whose texture fits its width once and repeats by tiles.
 
-        The texture is mirrored on the left of the reference line, so that neighbours differ.
+        The texture is mirrored on the left of the reference line; neighbours differ.
         """
         s, t = _grid(self.rows(*span_m), np.array(t_m))
         u = (t - t[0, 0]) / (t[0, -1] - t[0, 0])

@@ -13,8 +13,8 @@ from gen_data.core.errors import AssetError
 RAMP_M = 0.45
 """Length of the ramp before the kerb (assumed, 30 %)."""
 _KERB_M, _PROUD_M, _FLANK_M = 0.2, 0.012, 0.25
-"""Width of the kerb under the ramp's end; how far the asphalt lies over what it covers; width of
-the slopes beside it."""
+"""Width of the kerb under the ramp's end; height of the asphalt over the covered surface; width of
+the flanks [m]."""
 
 
 def driveway(
@@ -25,12 +25,12 @@ def driveway(
     kerb_m: float = 0.12,
     rise_m: float = 0.18,
 ) -> Solid:
-    """A strip of asphalt across the kerb and what lies behind it, with sloping flanks.
+    """A strip of asphalt across the kerb and the strip behind it, with sloping flanks.
 
     Args:
-        seed: Of the asphalt.
-        width_m: Along the road, without the flanks.
-        depth_m: From the kerb's foot to the end.
+        seed: Seed of the asphalt.
+        width_m: Width along the road, without the flanks.
+        depth_m: Distance from the kerb's foot to the end.
         kerb_m: Height of the kerb over the gutter.
         rise_m: Height at the end over the gutter.
 

@@ -1,4 +1,4 @@
-"""Fields beside a road: parcels of crops in rows, headlands, tracks between them."""
+"""Fields along a road: parcels of crops in rows, headlands, tracks between them."""
 
 import math
 from collections.abc import Iterator

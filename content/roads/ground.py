@@ -21,7 +21,7 @@ def ground(
     """A plane around the origin whose highest points are at z = 0.
 
     Args:
-        seed: Of relief and texture.
+        seed: Seed of relief and texture.
         size_m: Extent along X and Y.
         cover: A word of ``GROUNDS``.
         relief_m: Depth of the hollows.

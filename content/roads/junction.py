@@ -32,12 +32,12 @@ from gen_data.roads.junction_shape import (
 )
 
 _CELL_M = 0.6
-"""Markings are cut this small, so that they follow the surface."""
+"""Largest size of pieces of markings, which must follow the surface [m]."""
 _TIP_RAD = math.radians(60.0)
 
 
 def junction(*, crossings: str = "zebra", **others: Any) -> Solid:
-    """A junction about the origin; slots are those of ``street_materials``.
+    """A junction about the origin; slots as in ``street_materials``.
 
     Args:
         crossings: Style of the crosswalks: ``zebra``, ``ladder``, ``lines`` or ``none``.
@@ -111,9 +111,9 @@ def _band(
 
 
 def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
-    """Land between two arms, from the sidewalk to the land beside the arms.
+    """Land between two arms, from the sidewalk to the land along the arms.
 
-    With gardens before the houses it is level, as they are.
+    With front gardens, it is level, as they are.
     """
     offset = shape.border_m if shape.sidewalk_m > 0.0 else 0.0
     z = shape.edge_z_m if shape.sidewalk_m > 0.0 else 0.0
@@ -141,7 +141,7 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
         return _fan_patch(center, loop, "ground", slot).flipped()
     ends = []
     for end, arm, side in ((0, number, 1.0), (-1, (number + 1) % len(shape.arms_rad()), -1.0)):
-        # The same profile as beside the road that goes on here.
+        # The same profile as along the road that continues here.
         out = side * (away + APRON_M * np.array(APRON_STEPS[1:]))
         flat = arm_points(shape, arm, np.full(len(out), shape.reach_m()), out)
         fall = np.array(APRON_DROPS[1:]) * (z + APRON_FALL_M)

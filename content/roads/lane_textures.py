@@ -1,8 +1,8 @@
-"""Driven surfaces of one lane from above: across the image once the lane, along it one tile.
+"""Driven surfaces of one lane from above: one lane across the image, one tile along it.
 
-All wear of a seed lies on the same base image and fades out at both ends of the tile, so that tiles
-of different wear follow each other without a seam. Images are 1024 pixels along and 512 across:
-12 mm and 7 mm each in a lane 3.5 m wide, because cameras see roads foreshortened.
+All wear of a seed lies on the same base image and fades out at both ends of the tile: tiles of
+different wear join without a seam. Images are 1024 pixels along and 512 across: 12 mm and 7 mm each
+in a lane 3.5 m wide, because cameras see roads foreshortened.
 """
 
 import math
@@ -48,8 +48,8 @@ def asphalt_lane(seed: int, age_years: float = 6.0, damage: str = "none") -> Tex
     """A lane of asphalt: tyre tracks, a trace of oil between them, streaks along it.
 
     Args:
-        seed: Of everything drawn, and of the stone.
-        age_years: Since it was laid: bitumen wears off the stones, which are lighter.
+        seed: Seed of all draws, and of the stone.
+        age_years: Time since it was laid: bitumen wears off the stones, which are lighter.
         damage: A word of ``DAMAGES``.
 
     Raises:
@@ -66,7 +66,7 @@ def asphalt_lane(seed: int, age_years: float = 6.0, damage: str = "none") -> Tex
     streaks = fbm((2, 48), 3, rng, 0.6, _N)
     shade = 1.0 + (0.3 + 0.6 * aged) * stones + (0.04 + 0.06 * aged) * blotches
     shade += (0.02 + 0.03 * aged) * clouds + (0.02 + 0.035 * aged) * streaks
-    # Tyres uncover stones; oil drips on the middle of the lane; dust settles beside the tracks.
+    # Tyres uncover stones; oil drips on the middle of the lane; dust settles next to the tracks.
     polish = tracks * np.float32(0.05 + 0.05 * aged)
     oil = np.exp(-(((x - 0.5) / 0.1) ** 2)) * (0.75 + 0.25 * smoothstep(-0.6, 0.6, streaks))
     shade *= 1.0 + polish - np.float32(0.03 + 0.09 * aged) * oil
@@ -86,8 +86,8 @@ def concrete_lane(seed: int, age_years: float = 6.0, damage: str = "none") -> Te
     Slabs are a third of a tile long: 4 m; real ones measure 3 to 5 m (assumed).
 
     Args:
-        seed: Of everything drawn.
-        age_years: Since it was laid: concrete darkens (LBNL-43442: 0.35-0.4 new, 0.25-0.3 aged).
+        seed: Seed of all draws.
+        age_years: Age: concrete darkens (LBNL-43442: albedo 0.35-0.4 new, 0.25-0.3 aged).
         damage: A word of ``DAMAGES``.
 
     Raises:
@@ -127,10 +127,10 @@ def concrete_lane(seed: int, age_years: float = 6.0, damage: str = "none") -> Te
 
 
 def track_lane(seed: int, material: str = "earth") -> TextureData:
-    """An unpaved lane: two worn tracks, loose stones and weeds between and beside them.
+    """An unpaved lane: two worn tracks, loose stones and weeds between and next to them.
 
     Args:
-        seed: Of everything drawn.
+        seed: Seed of all draws.
         material: ``earth`` or ``gravel``.
 
     Raises:
@@ -167,12 +167,12 @@ def track_lane(seed: int, material: str = "earth") -> TextureData:
 def gutter(rng: VariantRng, age_years: float = 6.0) -> TextureData:
     """The edge of a carriageway: clean asphalt at both sides of the image, the kerb in its middle.
 
-    Grit, sand and a few leaves that wind and water leave there; 3 m per repeat along the kerb,
+    Wind and water leave grit, sand and a few leaves there; 3 m per repeat along the kerb,
     0.5 m from it to clean asphalt.
 
     Args:
-        rng: All that is drawn, also the stone.
-        age_years: Of the asphalt below.
+        rng: All draws, including the stone.
+        age_years: Age of the asphalt below.
     """
     n = 512
     x = 1.0 - np.abs(2.0 * rows_and_columns(n)[1] - 1.0)

@@ -1,4 +1,4 @@
-"""Level crossings: rails and panels across a road; ``scenery.railway`` has the track beside it."""
+"""Level crossings: rails and panels across a road; ``scenery.railway`` has the adjacent track."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -25,7 +25,7 @@ def level_crossing(*, station_m: float = 60.0, **others: Any) -> Solid:
 
     Args:
         station_m: Middle of the track along the road.
-        others: Fields of ``StreetLook`` and of ``RoadShape``; those of the road.
+        others: Fields of ``StreetLook`` and of ``RoadShape``, as for the road.
     """
     look, shape = road_materials.split_look(others)
     profile = RoadShape(**shape)

@@ -103,7 +103,7 @@ def _center(word: str, dash_m: tuple[float, float], width_m: float) -> list[Stri
 def _edges(
     row: tuple[Strip, ...], driving: list[Strip], width_m: float, kerbs: bool
 ) -> list[Stripe]:
-    """Edge lines: inside the outermost lane, or between it and the strip beside it."""
+    """Edge lines: inside the outermost lane, or between it and the adjacent strip."""
     if not driving:
         return []
     outer, beyond = driving[-1], [s.kind for s in row if s.inner_m >= driving[-1].outer_m]

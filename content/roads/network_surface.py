@@ -20,7 +20,7 @@ _SHAPED_PARTS = 4
 def network_solid(network: Network) -> Solid:
     """Every lane as a strip, kerbs where heights differ, and the lane marks.
 
-    Slots are those of ``street_materials``; the origin is ``origin_m``.
+    Slots as in ``street_materials``; the origin is ``origin_m``.
     """
     look = road_materials.StreetLook()
     slots = road_materials.number_slots(look)
@@ -79,7 +79,8 @@ class _Band:
         ]
         lines = lines if self.side > 0 else lines[::-1]
         points = np.stack(lines, axis=1)
-        # The plan is the world's, so that roads that overlap in a junction show one surface.
+        # Texture coordinates follow the world frame: overlapping roads in a junction show one
+        # surface.
         plan = points[..., :2] + points[..., 2:] * np.array([1.0, 1.0])
         return deck.surface(points, plan, slot, self.slots[slot])
 

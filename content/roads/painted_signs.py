@@ -3,7 +3,7 @@
 Outlines are in the reader's frame: X along the lane in the direction of travel from the foot of the
 sign, Y to the left of its middle. Sources: letters of at least 1.8 m (MUTCD 2009, 3B.20); hatching
 of blocked areas at 45 degrees in bars of 0.25 or 0.50 m (Austria, Bodenmarkierungsverordnung).
-Arrows of 5 m, letters of 2.4 m and all shapes are assumed, within a fifth of those in Europe.
+Arrows of 5 m, letters of 2.4 m and all shapes are assumed, within a fifth of European sizes.
 """
 
 import math

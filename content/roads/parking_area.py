@@ -15,11 +15,11 @@ _APRON_M, _APRON_Z_M = 4.0, -0.12
 
 
 def parking_area(**parameters: Any) -> Solid:
-    """A level car park around the origin; slots are those of ``street_materials``.
+    """A level car park around the origin; slots as in ``street_materials``.
 
     Args:
-        parameters: Fields of ``StreetLook`` and of ``ParkingShape``. Sidewalks have no area here,
-            as all streets share one set of slots.
+        parameters: Fields of ``StreetLook`` and of ``ParkingShape``. Sidewalks have no area here;
+            their slots exist because all streets share one set.
     """
     look, shape = road_materials.split_look(parameters)
     profile = ParkingShape(**{**shape, **_round_counts(shape)})

@@ -1,4 +1,4 @@
-"""Paved areas beside roads: forecourts and squares."""
+"""Paved areas along roads: forecourts and squares."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def paved_area(
     Args:
         size_m: Extent along X and Y.
         cover: A word of ``GROUNDS``.
-        seed: Of its texture.
+        seed: Seed of its texture.
 
     Raises:
         AssetError: the cover is unknown.

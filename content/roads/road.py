@@ -45,14 +45,14 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
     tram: float = 0.0,
     **others: Any,
 ) -> Solid:
-    """A road from the origin along +X; slots are those of ``street_materials``.
+    """A road from the origin along +X; slots as in ``street_materials``.
 
     Args:
         markings: Line in the middle: ``solid``, ``dashed``, ``double`` or ``none``.
         edge_lines: ``solid`` or ``none``.
         dash_m: Length of dashes and of the gaps between them.
         line_m: Width of narrow lines.
-        apron_m: Width of the land beside it; 0 = none.
+        apron_m: Width of the land along it; 0 = none.
         rails: Guard rails, left and right: 0 = none, 1 = along the road, 2 = outside of bends.
         arrows: Whether lanes that lead to its start and to its end have arrows.
         tram: Whether the lanes next to the middle have the rails of a tramway.
@@ -186,7 +186,7 @@ def _beside(deck: Deck, profile: RoadShape, side: int, apron_m: float) -> Iterat
 
 
 def _kerb(deck: Deck, profile: RoadShape, strip: Strip) -> Patch:
-    """Face and top of a row of kerb stones; those of a median face outwards."""
+    """Face and top of a row of kerb stones; kerbs of a median face outwards."""
     away = np.array([0.0, _BATTER_M, _BATTER_M + 0.015, KERB_WIDTH_M])
     z0, top = sorted((strip.inner_z_m, strip.outer_z_m))
     heights = np.array([z0, top - 0.015, top, top])
@@ -222,7 +222,7 @@ def _beyond(
     s, t = np.meshgrid(deck.rows(0.0, length_m), side * across_m, indexing="ij")
     points = deck.at(s, t)
     points[..., 2] = z_m
-    # The texture follows the profile's own length, so that it is not stretched on a kerb's face.
+    # Texture coordinates follow the profile's arc length: no stretching on the face of a kerb.
     along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(t[0]), np.diff(z_m)))])
     plan = np.stack([s, t[0, 0] + np.broadcast_to(along, s.shape)], axis=2)
     return surface(points, plan, slot, deck.slots[slot])
@@ -253,7 +253,7 @@ def _signs(
 def _turns(count: int, traffic: str, *, apart: bool) -> list[str]:
     """Arrow of each lane from the middle outwards, as ``junction_lanes`` connects them.
 
-    ``apart`` = those who turn across have a lane of their own.
+    ``apart`` = traffic that turns across has a separate lane.
     """
     across, aside = ("left", "right") if traffic == "right" else ("right", "left")
     if count < 2:
@@ -379,9 +379,9 @@ def crosswalk(
 
     Args:
         station_m: Its middle, along the road.
-        width_m: Along the road, the length of its bars.
+        width_m: Width along the road, the length of its bars.
         style: ``zebra``, or ``ladder`` with lines at both ends of the bars.
-        others: Fields of ``StreetLook`` and of ``RoadShape``; those of the road.
+        others: Fields of ``StreetLook`` and of ``RoadShape``, as for the road.
     """
     check_option("crosswalk", "style", style, ("zebra", "ladder"))
     look, shape = road_materials.split_look(others)

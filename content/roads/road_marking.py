@@ -48,8 +48,8 @@ def road_marking(
         across_m: Its middle, to the left of the road's middle.
         turned: Whether it is read against the road's direction.
         area_m: Length of blocked areas and zigzag lines.
-        width_m: Their width, that of lines across the lane, and the largest width of a word.
-        others: Fields of ``StreetLook`` and of ``RoadShape``; those of the road.
+        width_m: Width of these and of lines across the lane, and the largest width of a word.
+        others: Fields of ``StreetLook`` and of ``RoadShape``, as for the road.
 
     Raises:
         AssetError: the sign or a letter of the text is unknown.

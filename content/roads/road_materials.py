@@ -26,7 +26,7 @@ GROUNDS = ("grass", "paving", "cobbles", "gravel", "earth", "asphalt")
 def textured_material(
     name: str, role: str, roughness: float, color: Vec3 = (1.0, 1.0, 1.0)
 ) -> Material:
-    """A surface with texture coordinates of its own; the name is that of a texture's id."""
+    """A surface with separate texture coordinates; the name is a texture's id."""
     return Material(color, roughness, texture=f"texture/{name}", role=role)
 
 
@@ -42,7 +42,7 @@ UNPAVED = ("gravel", "earth")
 LANE_SLOTS = ("lane", "lane_cracks", "lane_alligator", "lane_stains", "lane_new")
 """Slots of driven lanes; their textures follow the lane, see ``lane_textures``."""
 AGES_YEARS = (0.5, 1.5, 3.0, 6.0, 12.0, 25.0)
-"""Ages that have textures of their own; others take the nearest: their number is bounded."""
+"""Ages with separate textures; others use the nearest, which bounds the number of textures."""
 _BASIC = 11
 _COLORS: dict[str, Vec3] = {
     "red": (0.26, 0.055, 0.04), "green": (0.05, 0.15, 0.085), "blue": (0.035, 0.11, 0.27),
@@ -53,15 +53,15 @@ _COLORS: dict[str, Vec3] = {
 
 @dataclass(frozen=True, slots=True)
 class StreetLook:
-    """How the surfaces of a street look.
+    """Appearance of the surfaces of a street.
 
     Attributes:
-        seed: Of textures.
+        seed: Seed of textures.
         wear: 0 freshly laid to 1 worn out.
         paving: Cover of the sidewalks, a word of ``GROUNDS``.
-        ground: Cover of the land beside, a word of ``GROUNDS``.
+        ground: Cover of the adjacent land, a word of ``GROUNDS``.
         carriageway: Driven surface, a word of ``CARRIAGEWAYS``.
-        age_years: Of the carriageway's surface; negative = 40 years times the wear.
+        age_years: Age of the carriageway's surface; negative = 40 years times the wear.
         coating: Colour of bicycle lanes and of areas laid out with them; ``none`` = asphalt.
         center_color: Colour of the line between the directions, ``white`` or ``yellow`` (MUTCD).
     """
@@ -92,7 +92,7 @@ def street_materials(look: StreetLook) -> dict[str, Material]:
     check_option("road", "coating", look.coating, _COLORS)
     seed, worn, stone = look.seed, f"{round(look.wear, 1):g}", look.seed % 4
     age = f"age_years={look.age_shown_years:g}"
-    # Some roads have been painted anew, on others the paint is older than usual.
+    # Some roads have been repainted; on others the paint is older than usual.
     paint = (look.wear, min(look.wear, 0.1), min(1.0, look.wear + 0.2))[seed % 3]
     line = f"road_paint?{age}&seed={stone}&wear={round(paint, 1):g}"
     white = textured_material(line, "marking", 0.75)
@@ -129,7 +129,7 @@ def street_materials(look: StreetLook) -> dict[str, Material]:
 
 
 def _driven(look: StreetLook, asphalt: Material) -> Material:
-    """The carriageway where it is no lane: parking strips, shoulders, junctions."""
+    """The carriageway outside lanes: parking strips, shoulders, junctions."""
     if look.carriageway == "asphalt":
         return asphalt
     if look.carriageway == "concrete":
@@ -155,7 +155,7 @@ def _lane_slots(look: StreetLook, base: Material, stone: int, age: str) -> dict[
 
 
 def _repaired(look: StreetLook) -> str:
-    """Age of patches and stretches paved anew, as a parameter."""
+    """Age of repaved patches and stretches, as a parameter."""
     return f"age_years={(1.5, 3.0)[look.seed % 2]:g}"
 
 

@@ -131,9 +131,9 @@ def road_paint(rng: VariantRng, wear: float = 0.3, age_years: float = 6.0) -> Te
     """White marking: glass beads in paint, dirtied and worn down to the road; 2 m per repeat.
 
     Args:
-        rng: All that is drawn, also the stone of the asphalt below.
-        wear: 0 fresh to 1 hardly visible in places; 1.6: only traces.
-        age_years: Of the asphalt below.
+        rng: All draws, including the stone of the asphalt below.
+        wear: 0 fresh to 1 barely visible in places; 1.6: only traces.
+        age_years: Age of the asphalt below.
     """
     grain = (uniform((512, 512), rng) - 0.5).astype(np.float32)
     dirt = smoothstep(-0.6, 1.0, fbm((6, 6), 5, rng, 0.6)) * np.float32(

@@ -20,9 +20,9 @@ Span = tuple[float, float]
 
 
 def lane_tiles(length_m: float, wear: float, rng: VariantRng) -> list[tuple[Span, str]]:
-    """Spans of a lane with the slot of each; neighbours of one slot are joined.
+    """Spans of a lane with the slot of each; neighbours with the same slot are joined.
 
-    A worn lane has cracked and stained tiles, and often a stretch that was paved anew.
+    A worn lane has cracked and stained tiles, and often a repaved stretch.
     """
     count = math.ceil(length_m / TILE_M - 1e-9)
     slots = []

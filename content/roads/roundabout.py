@@ -24,7 +24,7 @@ _YIELD_M, _YIELD_GAP_M = (0.5, 0.5), 0.25
 
 
 def roundabout(*, crossings: str = "zebra", **others: Any) -> Solid:
-    """A roundabout about the origin; slots are those of ``street_materials``.
+    """A roundabout about the origin; slots as in ``street_materials``.
 
     Args:
         crossings: Style of the crosswalks: ``zebra``, ``ladder``, ``lines`` or ``none``.

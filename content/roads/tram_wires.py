@@ -28,7 +28,7 @@ def contact_wires(
     Args:
         span_m: Length of the span.
         left_m: Distance of the left pole from the middle of the road.
-        right_m: Likewise of the right pole.
+        right_m: Distance of the right pole.
         tracks_m: Distance of each track's middle from it.
 
     Raises:

@@ -1,7 +1,7 @@
 """Guard rails, jersey barriers and work-site barriers.
 
-Pieces run along Y, so that they line a street whose traffic they face with +X; sections of equal
-length join end to end.
+Pieces run along Y and face the traffic of a street with +X; sections of equal length join end to
+end.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Things that people take along: prams, suitcases, shopping bags.
+"""Belongings that people take along: prams, suitcases, shopping bags.
 
 Sizes: assumed from makers' catalogues, 10 %.
 """

@@ -42,7 +42,7 @@ class Skeleton:
     Attributes:
         nodes_m: Positions, [n, 3].
         parents: Number of each node's parent, -1 for the root, [n].
-        radii_m: Of the wood at each node, [n].
+        radii_m: Radius of the wood at each node, [n].
     """
 
     nodes_m: Array
@@ -108,7 +108,7 @@ def wood(skeleton: Skeleton, thinnest_m: float, stride: int = 2) -> Patch:
             continue
         kept = np.unique([*range(0, thick, stride), thick])
         path, r = skeleton.nodes_m[chain][kept], radii[kept].copy()
-        # A branch starts with its own thickness, not with that of its parent.
+        # A branch starts with its own thickness, not with its parent's.
         r[0] = min(r[0], 1.25 * r[1])
         sides = 8 if r[0] > 0.1 else 5 if r[0] > 0.035 else 3
         up = (1.0, 0.0, 0.0) if abs(path[1, 2] - path[0, 2]) > 0.05 else (0.0, 0.0, 1.0)

@@ -27,34 +27,34 @@ Cladding = Literal["plaster", "brick", "concrete", "stone", "boards", "sheet", "
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """Measures and features that the parts of one building share.
+    """Dimensions and features shared by the parts of one building.
 
     Attributes:
         bays: Windows per floor on the street side.
         ground_m, storey_m: Heights of the ground floor and of the others.
         window_m: Width and height of an ordinary window.
         sill_m: Height of window sills over the floor.
-        panes: Panes beside and above one another.
+        panes: Columns and rows of panes.
         shops: Whether the ground floor is shops.
         trimmed: Whether windows have lintels and storeys are parted by string courses.
         shutters: ``none``, ``roller`` or ``leaves``.
         balconies: ``none``, ``french`` (railings before tall windows) or ``slab``.
-        verge_m: How far the roof reaches over the side walls; 0 in a row of houses.
+        verge_m: Overhang of the roof over the side walls; 0 in a row of houses.
         sided: Whether side walls have windows.
         oriel: Number of the bay that projects over the pavement on the upper floors; -1 = none.
-        gable_front: Whether the ridge runs across the street and the gable looks at it.
-        ground: What the ground floor has: ``dwelling`` (windows and a door), ``lobby`` (glass),
-            ``garage`` (a garage door beside the windows) or ``gates``; shops if ``shops``.
+        gable_front: Whether the ridge runs across the street and the gable faces it.
+        ground: Use of the ground floor: ``dwelling`` (windows and a door), ``lobby`` (glass),
+            ``garage`` (a garage door next to the windows) or ``gates``; shops if ``shops``.
         ribbons: Whether windows of a floor are one band around the building.
-        surround: What borders windows: ``none``, ``border`` or ``pediment``.
+        surround: Surround of windows: ``none``, ``border`` or ``pediment``.
         arched: Whether windows have arches.
         timbered: Whether posts and beams show in the upper floors.
         quoins: Whether stones mark the corners.
-        wing: Number of bays that stand out from the ground up, at one end; 0 = none.
-        wing_out_m: How far they stand out.
-        porch: What covers the entrance: ``none``, ``canopy`` or ``columns``.
+        wing: Number of bays that project from the ground up, at one end; 0 = none.
+        wing_out_m: Their projection.
+        porch: Cover of the entrance: ``none``, ``canopy`` or ``columns``.
         age: 0 (new) to 1 (neglected): stains, repairs, cables, graffiti.
-        fittings: 0 to 1: how many dishes, air conditioners and boxes of flowers there are.
+        fittings: 0 to 1: density of dishes, air conditioners and flower boxes.
         gate_m: Width of a fence between the building and its neighbour; 0 = none.
     """
 
@@ -101,7 +101,7 @@ class Design:
 
 
 _PLAIN_FROM = 19
-"""Fronts of more windows than this have plainer ones, so that no mesh is large."""
+"""Fronts with more windows than this have simpler ones, which bounds the size of meshes."""
 _STYLES = load_table(__package__, "building_styles", dict)
 _COLORS = load_table(__package__, "building_colors", tuple[str, ...])
 
@@ -205,7 +205,7 @@ TEXTURE_ALBEDOS = {
     "ashlar": 0.71, "concrete": 0.36, "profiled_sheet": 0.72, "roof_tiles": 0.53, "slates": 0.66,
     "wall_boards": 0.76, "weathered_plaster": 0.80,
 }  # fmt: skip
-"""Mean luminance of textures that palettes tint. Their colours are those of whole walls and roofs:
+"""Mean luminance of textures that palettes tint. Palettes state colours of whole walls and roofs:
 white paint 0.5 to 0.9, brick 0.2 to 0.4, stone 0.2 to 0.35, concrete and roof tiles 0.1 to 0.35
 (Oke, "Boundary layer climates", 1987, and Taha, "Urban climates and heat islands", 1997, as others
 quote them); from memory, coloured paint 0.15 to 0.35, +- 0.1, and slate 0.1, +- 0.05. Undivided,
@@ -226,7 +226,7 @@ def choose_region(style: str, seed: int, region: str) -> str:
 def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
     cladding = plan.cladding
     if cladding == "brick":
-        # Those with an albedo of 0.20 to 0.32; the darkest of Oke's walls of brick have 0.20.
+        # Colours with an albedo of 0.20 to 0.32; the darkest of Oke's brick walls have 0.20.
         seed, level = rng.choose((0, 2, 4, 6, 9, 12, 13)), rng.between(0.93, 1.0)
         return _textured_material("brick", seed, (level, level, level), 1.1)
     if cladding == "concrete":

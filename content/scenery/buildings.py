@@ -165,7 +165,7 @@ def _flat_roof(plan: building_designs.Design, rng: VariantRng) -> Patch:
 
 
 def _crown(at_m: tuple[float, float], ridge_m: float, rng: VariantRng) -> list[Patch]:
-    """What stands on a ridge: an aerial, a second chimney."""
+    """Objects on a ridge: an aerial, a second chimney."""
     parts = []
     if rng.chance(0.4):
         parts.append(fittings.aerial(rng).moved(-0.1, at_m[1] + 0.8, ridge_m))

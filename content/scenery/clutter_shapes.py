@@ -69,7 +69,7 @@ def hopper(
 
 
 def on_ground(parts: Sequence[Patch]) -> list[Patch]:
-    """The parts, moved so that the lowest point of all is at z = 0."""
+    """The parts, moved until the lowest point of all is at z = 0."""
     low = min(float(part.bounds_m()[0][2]) for part in parts)
     return [part.moved(z=-low) for part in parts]
 

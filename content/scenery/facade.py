@@ -40,8 +40,8 @@ class Opening:
 
     Attributes:
         y_m, z_m: Its extent in the wall's frame.
-        recess_m: How far the frame lies behind the wall's plane.
-        upright, level: Number of panes beside and above one another.
+        recess_m: Depth of the frame behind the wall's plane.
+        upright, level: Number of columns and rows of panes.
         arch_m: Rise of the arch at its top; 0 = flat.
     """
 
@@ -102,7 +102,7 @@ def _gaps(y: Sequence[float], holes: Sequence[Span]) -> list[Span]:
 
 
 def _spandrels(opening: Opening, slot: int) -> Patch:
-    """What an arch leaves of the two upper corners of a hole, and the arch's underside."""
+    """The wall above an arch in the two upper corners of a hole, and the arch's underside."""
     (y0, y1), top = opening.y_m, opening.z_m[1]
     turn = np.linspace(math.pi, 0.0, 7)
     y = 0.5 * (y0 + y1) + 0.5 * (y1 - y0) * np.cos(turn)

@@ -1,4 +1,4 @@
-"""Things fixed to walls, on balconies and on roofs, and traces of age; in a wall's frame."""
+"""Fittings of walls, balconies and roofs, and traces of age; in a wall's frame."""
 
 import math
 
@@ -84,7 +84,7 @@ def _tuft(x: float, y: float, z: float, size_m: tuple[float, float]) -> Patch:
 
 
 def balcony_things(y_m: Span, z0: float, out_m: float, rng: VariantRng) -> list[Patch]:
-    """What stands and hangs on a balcony: boxes of flowers, chairs, washing, a dish, a parasol."""
+    """Contents of a balcony: flower boxes, chairs, washing, a dish, a parasol."""
     (y0, y1), parts = y_m, []
     if y1 - y0 < 1.2:
         return []
@@ -125,7 +125,7 @@ def balcony_things(y_m: Span, z0: float, out_m: float, rng: VariantRng) -> list[
 def fixtures(
     openings: list[Opening], half_m: float, eaves_m: float, rng: VariantRng
 ) -> list[Patch]:
-    """Dishes and air conditioners below or beside some windows."""
+    """Dishes and air conditioners below or next to some windows."""
     parts = []
     share = rng.choose((0.0, 0.0, 0.04, 0.1, 0.25))
     kind = rng.choose((satellite_dish, air_conditioner, air_conditioner))
@@ -156,7 +156,7 @@ def cables(half_m: float, z: float, rng: VariantRng) -> list[Patch]:
 
 
 def doorside(y: float, z: float, rng: VariantRng) -> Patch:
-    """Beside an entrance: bells, a number plate, a lamp, perhaps letter boxes."""
+    """Fittings at an entrance: bells, a number plate, a lamp, perhaps letter boxes."""
     parts = [ledges([(0.0, 0.02, y, y + 0.14, z + 1.2, z + 1.45)], METAL)]
     parts.append(ledges([(0.0, 0.02, y, y + 0.2, z + 1.7, z + 1.88)], rng.choose((ACCENT, WHITE))))
     parts.append(ledges([(0.0, 0.14, y + 0.02, y + 0.16, z + 1.98, z + 2.2)], WHITE))

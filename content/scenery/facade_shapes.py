@@ -33,7 +33,8 @@ def rectangles(
 ) -> Patch:
     """Upright rectangles that face +X, in the plane x.
 
-    ``images`` are (left, right, bottom, top) of what each shows of its texture; all by default.
+    ``images`` are the parts (left, right, bottom, top) of the texture that each shows; by default
+    all of it.
     """
     n = len(places)
     flat = np.array(places, dtype=np.float64).reshape(n, 4)[:, _CORNERS]

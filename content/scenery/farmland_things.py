@@ -1,4 +1,4 @@
-"""Things that stand in fields: bales of straw and pylons of power lines.
+"""Objects in fields: bales of straw and pylons of power lines.
 
 Frame: metres, Z up, front +X, origin on the ground.
 """
@@ -77,10 +77,10 @@ def power_pylon(seed: int, span_m: float) -> Solid:
     """A lattice pylon of a 110 kV line, with the halves of the two spans that meet at it.
 
     Conductors run along X; pylons of one seed, ``span_m`` apart, join. The body without conductors
-    has bounds of its own. Slots: steel, concrete, insulators, conductors.
+    has separate bounds. Slots: steel, concrete, insulators, conductors.
 
     Args:
-        seed: Of the variant.
+        seed: Seed of the variant.
         span_m: Distance between pylons, 0 = without conductors.
 
     Raises:

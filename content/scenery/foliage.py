@@ -1,7 +1,7 @@
 """Leaves as geometry: small triangles, shaded as if the crown were one soft body.
 
-Every triangle stands for a spray of leaves. Its front faces outward and its normals lean away from
-the middle of its crown, so that a crown is lit as a whole and not glittering leaf by leaf.
+Every triangle represents a spray of leaves. Its front faces outward and its normals lean away from
+the middle of its crown: a crown is lit as a whole and does not glitter leaf by leaf.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What ends a view: tree lines, forests and hills, in pieces that stand side by side.
+"""Horizons: tree lines, forests and hills, in pieces that stand side by side.
 
 Pieces run along Y and face +X, the side from which they are seen; their origin is below their
 middle. They are meant for distances from 40 m on; ``townscapes`` has towns.

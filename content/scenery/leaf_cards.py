@@ -1,7 +1,7 @@
 """Foliage as cards: rectangles that show a tile of a texture with holes between its leaves.
 
-A card's front faces outward and its normals lean away from the middle of its crown, so that a crown
-is lit as a whole. Its texture has ``TILES`` by ``TILES`` tiles (``textures.leaves``).
+A card's front faces outward and its normals lean away from the middle of its crown: a crown is lit
+as a whole. Its texture has ``TILES`` by ``TILES`` tiles (``textures.leaves``).
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,8 +28,8 @@ class Cards:
         along: Unit direction from there to the upper edge, [n, 3].
         across: Unit direction of the lower edge, [n, 3].
         outward: Unit direction away from the crown's middle, [n, 3].
-        length_m: From the lower to the upper edge, [n].
-        width_m: Of the lower edge, [n].
+        length_m: Distance from the lower to the upper edge, [n].
+        width_m: Length of the lower edge, [n].
         slots: Material of each, [n].
     """
 
@@ -127,18 +127,18 @@ BROAD: Vec3 = (0.6, 0.75, 0.1)
 PROSPECT-5 (Jacquemoud and Baret, "PROSPECT: a model of leaf optical properties spectra", Remote
 Sensing of Environment 34, 1990; Feret et al. 2008) gives leaves of 40 ug/cm^2 of chlorophyll the
 transmittance (0.07, 0.12, 0.00) and a diffuse reflectance of half as much, in linear sRGB under
-6500 K. Colours of crowns are two to three times as bright as such leaves, since they stand for what
-leaves reflect to one another, so that these shares of their mean (0.11, 0.15, 0.04) give the
-model's transmittance. Between 25 and 60 ug/cm^2 it is 1.6 to 0.4 times as much."""
+6500 K. Colours of crowns are two to three times as bright as such leaves, since they include
+interreflection between leaves; these shares of their mean (0.11, 0.15, 0.04) give the model's
+transmittance. Between 25 and 60 ug/cm^2 it is 1.6 to 0.4 times as much."""
 _TOUGH: Vec3 = (0.3, 0.4, 0.05)
-"""Of leathery leaves, likewise: PROSPECT-5 with 60 ug/cm^2 of chlorophyll and a thick mesophyll."""
+"""The same of leathery leaves: PROSPECT-5, 60 ug/cm^2 of chlorophyll and a thick mesophyll."""
 _NEEDLE: Vec3 = (0.15, 0.2, 0.0)
-"""Of needles and scales, likewise: PROSPECT-5 with 2.6 layers, (0.02, 0.03, 0.00)."""
+"""The same of needles and scales: PROSPECT-5 with 2.6 layers, (0.02, 0.03, 0.00)."""
 _GRASS: Vec3 = (0.6, 0.75, 0.15)
 """Of blades of grass; straw has as much, since cellulose absorbs little."""
 PETAL: Vec3 = (0.4, 0.4, 0.4)
 """Petals transmit nearly as much as they reflect (van der Kooi et al., "How to colour a flower",
-Proceedings of the Royal Society B 283, 2016); a part is left out for those that overlap. Assumed
+Proceedings of the Royal Society B 283, 2016); the value is lower because petals overlap. Assumed
 within 0.2."""
 _TISSUES: Mapping[str, Vec3] = {
     "needle": _NEEDLE,
@@ -162,7 +162,7 @@ def leaf_material(kind: str, color: str, level: float = 1.0, warm: float = 1.0) 
     """Leaves of ``textures.leaves`` in an sRGB colour.
 
     Args:
-        kind: Of leaves.
+        kind: Kind of leaves.
         color: ``#rrggbb`` of a leaf in full tone.
         level: Factor on brightness.
         warm: Factor on red.
@@ -183,10 +183,10 @@ def crown_shades(
 
 
 def depth_levels(codes: Sequence[str]) -> list[float]:
-    """Factors that make all of a crown's colours as bright as the last, that of its surface.
+    """Factors that make all colours of a crown as bright as the last, its surface colour.
 
-    Leaves in a crown's depth are dark for want of light, which renderers find; that they reflect
-    as much as others is assumed.
+    Leaves deep in a crown are dark for lack of light, which renderers compute; their reflectance is
+    assumed equal.
     """
     levels = colorimetry.luminance(np.array([hex_to_linear(code) for code in codes]))
     return [float(k) for k in np.round(levels[-1] / levels, 6)]

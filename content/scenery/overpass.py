@@ -31,7 +31,7 @@ def overpass(
     Slots: concrete, steel, asphalt.
 
     Args:
-        seed: Of colours.
+        seed: Seed of colours.
         span_m: Distance between its abutments.
         width_m: Width of the deck.
         clearance_m: Height of its underside.
@@ -100,13 +100,13 @@ def embankment(seed: int, length_m: float, width_m: float, height_m: float) -> S
     Slots: concrete, steel, asphalt, grass.
 
     Args:
-        seed: Of colours.
+        seed: Seed of colours.
         length_m: Length of the fill's top; beyond it the fill slopes down.
         width_m: Width of the road on it.
         height_m: Height of that road.
     """
     half, run = 0.5 * width_m, SLOPE * height_m
-    # The face is upright; wings close the fill beside it.
+    # The face is vertical; wings close the fill on both sides.
     top = np.array([(0.0, -half), (0.0, half), (length_m, half), (length_m, -half)])
     foot = np.array([(0.0, -half - run), (0.0, half + run), (length_m + run, half + run),
                      (length_m + run, -half - run)])  # fmt: skip

@@ -1,4 +1,4 @@
-"""Parts of a petrol station beside the canopy, and a fountain for squares.
+"""Parts of a petrol station besides the canopy, and a fountain for squares.
 
 Sizes: assumed from pictures, 20 %. Frame: metres, Z up, front +X, origin on the ground.
 """

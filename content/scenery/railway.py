@@ -1,4 +1,4 @@
-"""Railway track beside a level crossing.
+"""Railway track on both sides of a level crossing.
 
 Frame: along X, origin on the ground below its middle.
 """
@@ -27,7 +27,7 @@ def railway_track(seed: int, length_m: float) -> Solid:
     """A straight track on ballast; slots: ballast, sleepers, rails.
 
     Args:
-        seed: Of colours.
+        seed: Seed of colours.
         length_m: Length.
     """
     half = 0.5 * length_m

@@ -1,4 +1,4 @@
-"""Retaining walls: the cut face of a slope beside a road, with the ground that they hold.
+"""Retaining walls: the cut face of a slope along a road, with the ground that they hold.
 
 Sections run along Y, face the road with +X and join end to end. The wall leans back by a tenth of
 its height, as stacked walls do (FHWA-NHI-10-024, chapter 2: batter of modular walls), and the

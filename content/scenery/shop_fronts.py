@@ -66,7 +66,7 @@ def ground_floor(half_m: float, ground_m: float, slot: int, rng: VariantRng) -> 
 
 
 def _shop(shop: Premises, rng: VariantRng) -> Patch:
-    """Wall, windows, a door, a board, and what hangs over the pavement."""
+    """Wall, windows, a door, a board, and awnings or signs over the pavement."""
     y0, y1 = shop.y_m[0] + 0.3, shop.y_m[1] - 0.3
     panes = max(1, round((y1 - y0 - 1.3) / rng.between(2.0, 3.4)))
     entrance = rng.choose((0, panes, int(rng.random() * (panes + 1))))

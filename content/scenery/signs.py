@@ -59,7 +59,7 @@ def traffic_sign(seed: int, sign: str) -> Solid:
     outline = plate_outline(made.shape) * made.size_m
     half_high = float(outline[:, 1].max())
     foot = float(-outline[:, 1].min())
-    # Over a pavement the lower edge hangs 2.0-2.2 m high, so that people walk below.
+    # Over a pavement the lower edge is 2.0-2.2 m high: people walk below.
     centre_z = rng.between(2.0, 2.2, "lower_edge_m") + foot
     face = _plate(outline, made.size_m).moved(0.045, 0.0, centre_z)
     pole = post(0.03, (0.0, centre_z + half_high - 0.02), sides=10).painted(2)

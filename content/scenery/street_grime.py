@@ -1,7 +1,7 @@
-"""Grime of things that stand in streets: splashes at the foot, streaks below upper edges.
+"""Grime on street furniture: splashes at the foot, streaks below upper edges.
 
-The image multiplies a material's own colour. Its coordinates depend on the place: v runs from the
-ground to the top, u along X plus Y, once per ``_REPEAT_M``. Shares are assumed, within a half.
+The image multiplies a material's own colour. Its coordinates depend on the position: v runs from
+the ground to the top, u along X plus Y, once per ``_REPEAT_M``. Shares are assumed, within a half.
 """
 
 from dataclasses import replace
@@ -16,11 +16,11 @@ from gen_data.core.asset_types import Float32, Material, TextureData
 from gen_data.core.variant_rng import variant_rng
 
 STEPS = 8
-# Below this step things are as new.
+# Below this step surfaces are as new.
 _FIRST = 2
 _SIZE_PX = (128, 256)
 _REPEAT_M = 0.9
-# Border of the image, so that coarse mip levels do not mix foot and top.
+# Border of the image: coarse mip levels must not mix foot and top.
 _MARGIN = 0.06
 _SOOT, _MUD = (0.2, 0.19, 0.17), (0.36, 0.3, 0.22)
 
@@ -63,7 +63,7 @@ def street_grime(seed: int) -> TextureData:
     rows, _ = _SIZE_PX
     below = ((np.arange(rows, dtype=np.float32) + 0.5) / rows - _MARGIN) / (1.0 - 2.0 * _MARGIN)
     below = np.clip(below, 0.0, 1.0)[:, None]
-    # A streak keeps its column; noise of one row says where one begins and how far it runs.
+    # A streak keeps its column; noise of one row determines its start and length.
     source = traces.noise_bytes(FINE, (1, _SIZE_PX[1]), rng) / np.float32(255.0)
     broad = traces.noise_bytes(MEDIUM, (1, _SIZE_PX[1]), rng) / np.float32(255.0)
     length = np.float32(0.15) + 0.7 * broad

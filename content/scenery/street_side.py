@@ -1,4 +1,4 @@
-"""The street side of a building: ground floor, upper floors, and what is fixed to them.
+"""The street side of a building: ground floor, upper floors, and their fittings.
 
 Everything is in the wall's frame; see ``facade``.
 """
@@ -187,7 +187,7 @@ def _gates(plan: Design, part: Stretch, rng: VariantRng) -> Patch:
 
 
 def _dock(hole: Opening, rng: VariantRng) -> Patch:
-    """Bumpers beside a gate, a number above it, perhaps a canopy."""
+    """Bumpers on both sides of a gate, a number above it, perhaps a canopy."""
     (y0, y1), top = hole.y_m, hole.z_m[1]
     parts = [ledges([(0.0, 0.15, y - 0.1, y + 0.1, 0.2, 0.9) for y in (y0 - 0.2, y1 + 0.2)],
                     facade.DARK)]  # fmt: skip

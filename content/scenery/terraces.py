@@ -1,4 +1,4 @@
-"""What is paved in gardens: terraces and decks with a table and chairs, paths of slabs, stairs.
+"""Paved parts of gardens: terraces and decks with a table and chairs, slab paths, stairs.
 
 Pieces run along Y, paths to doors along X; their origin is on the ground.
 """
@@ -31,7 +31,7 @@ STONES = ((0.36, 0.35, 0.33), (0.27, 0.26, 0.26), (0.42, 0.38, 0.32), (0.33, 0.2
 def terrace(rng: VariantRng) -> Solid:
     """A terrace or deck of 3 to 5 m with a table and chairs, or a path of 5 to 10 m.
 
-    Slots: pavement, then those of the chairs.
+    Slots: pavement, then the slots of the chairs.
     """
     kind = rng.turn(_KINDS, "kind")
     if kind == "path":
@@ -79,7 +79,7 @@ def garden_path(seed: int, length_m: float) -> Solid:
     ]
     x = 0.5 * length_m
     if not is_slabs:
-        # Rows of edging stones, a little higher than what they hold.
+        # Rows of edging stones, a little higher than the surface between them.
         slabs += [
             block((-x, side * half - 0.04, 0.0), (x, side * half + 0.04, _SLAB_M + 0.015))
             for side in (-1.0, 1.0)
@@ -96,9 +96,9 @@ def door_stairs(seed: int, rise_m: float, width_m: float, landing_m: float) -> S
     Risers are at most 18 cm high, treads 29 cm deep (DIN 18065: 14 to 21 cm, 21 to 37 cm).
 
     Args:
-        seed: Of the stone: each of a few in turn.
+        seed: Seed of the stone, which cycles through a few kinds.
         rise_m: Height of the landing.
-        width_m: Of landing and steps.
+        width_m: Width of landing and steps.
         landing_m: Depth of the landing before the wall; the usual one reaches beyond the steps that
             some houses have themselves.
 

@@ -202,7 +202,7 @@ def _ridged(plan: _Block, rise: float, hip: float, *, along: bool, slot: int) ->
     long, wide = size if along else size[::-1]
     a, b = 0.5 * long + over, 0.5 * wide + over
     ends = a - max(hip, 0.0) if hip else a
-    # In a frame of its own: the ridge along Y, then turned and moved.
+    # In a local frame with the ridge along Y, then turned and moved.
     right = np.array([[(b, -a, h), (b, a, h)], [(0.0, -ends, top), (0.0, ends, top)]])
     slopes = [grid(right, slot=slot), grid(right * np.array([-1.0, -1.0, 1.0]), slot=slot)]
     gable = np.array([[(b, a, h), (-b, a, h)], [(0.0, ends, top), (0.0, ends, top)]])

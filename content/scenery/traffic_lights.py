@@ -122,7 +122,7 @@ def _visor(radius: float, reach: float) -> Patch:
 
 
 def _backboard(signal: Patch) -> Patch:
-    """A dark plate behind a head, wider than it, so that lenses stand out against the sky."""
+    """A dark plate behind a head, wider than it: lenses stand out against the sky."""
     low, high = signal.bounds_m()
     x, (y0, z0), (y1, z1) = float(low[0]) - 0.012, low[1:] - 0.14, high[1:] + 0.14
     outer = shapes.block((x, y0, z0), (x + 0.01, y1, z1), slot=BOARD)

@@ -34,8 +34,8 @@ _CARDS_MAX = 2600
 """Sprays on a tree in full leaf; larger crowns have larger ones."""
 _TWIGS = 1100
 _COVER = 0.58
-"""Share of a card that counts as leaf, fitted so that 0.9 to 0.99 of level rays through the middle
-of a crown meet one."""
+"""Share of a card that counts as leaf, fitted to 0.9 to 0.99 of horizontal rays through the middle
+of a crown that hit one."""
 _LEAF_LEVEL = 1.2
 """Leaves in the textures have this part of the surface's colours in ``species.yaml``, inverted."""
 _ATTRACTORS = 900
@@ -151,7 +151,7 @@ def seasonal_tree_facts(seed: int, season: str) -> Facts:
 
 
 def _species_of(seed: int, season: str) -> str:
-    """Deciduous species in turn; in spring, those that blossom every other time."""
+    """Deciduous species in turn; in spring, a blossoming one every other time."""
     listed = [name for name, kind in _SPECIES.items() if not kind.evergreen]
     blossoming = [name for name in listed if _SPECIES[name].blossom]
     if season == "spring" and seed % 2 == 0:
@@ -205,7 +205,7 @@ def _season_leaves(
 
 
 def _without_gaps(points: Array, shape: Shape, rng: VariantRng) -> Array:
-    """Attraction points without those in a few holes at the crown's surface."""
+    """Attraction points outside a few holes at the crown's surface."""
     low, high = points.min(axis=0), points.max(axis=0)
     kept = np.ones(len(points), dtype=np.bool_)
     for at in directions(6, rng):

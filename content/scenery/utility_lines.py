@@ -42,11 +42,11 @@ def utility_pole(seed: int, span_m: float) -> Solid:
     """A pole with cross-arm, insulators and the halves of the two spans that meet at it.
 
     Cables run along X, past the street on the left; they are level at mid-span, at the same places
-    for every variant: poles ``span_m`` apart, as rows without gaps are, join. The body without
-    cables has bounds of its own. Slots: pole, insulators, steel, cables, lamp.
+    for every variant: poles ``span_m`` apart, as in rows without gaps, join. The body without
+    cables has separate bounds. Slots: pole, insulators, steel, cables, lamp.
 
     Args:
-        seed: Of the variant.
+        seed: Seed of the variant.
         span_m: Distance between poles, 0 = without cables.
 
     Raises:

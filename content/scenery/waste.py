@@ -136,13 +136,13 @@ def _lid(x_m: tuple[float, float], w: float, z_m: tuple[float, float], state: st
     shell = hopper(low, low, (0.0, 0.3 * (z1 - z0)), 1)
     vault = hopper(low, high, (0.3 * (z1 - z0), z1 - z0), 1)
     lid = join_patches([shell, vault])
-    # Lids of small bins fall back until they hang, those of large ones stand.
+    # Lids of small bins fall back until they hang; lids of large ones stand.
     turn = {"closed": 0.0, "overfull": -0.42, "open": -4.1 if w < 1.0 else -1.9}[state]
     return [lid.rotated("y", turn).moved(x0, 0.0, z0)]
 
 
 def rubbish_bags(rng: VariantRng) -> Solid:
-    """A heap of full bags put out for collection; cardboard boxes beside them on some.
+    """A heap of full bags put out for collection; on some, cardboard boxes next to them.
 
     Slots: bags in two colours, cardboard, printed cardboard.
     """

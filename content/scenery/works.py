@@ -261,7 +261,7 @@ def scaffold(rng: VariantRng) -> Solid:
     Bay sizes of frame scaffolds (system widths of EN 12810: SW06 to SW09; 2.57 m is usual,
     assumed). The facade is at -X. Slots: steel, decks, boards, netting.
     """
-    # Neighbouring bays have standards of their own, side by side.
+    # Neighbouring bays have separate standards, side by side.
     half, x0, x1, lifts = 1.25, -0.365, 0.365, rng.turn((3, 4, 3, 5), "lifts")
     top = 2.0 * lifts
     parts = []

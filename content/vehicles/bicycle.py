@@ -99,7 +99,7 @@ def cyclist(seed: int, pose: str = "ride") -> Solid:
 
 
 def cyclist_facts(seed: int, pose: str = "ride") -> Facts:
-    """The kind of bicycle, and what its rider does."""
+    """The kind of bicycle, and the action of its rider."""
     return Facts(in_turn(STYLES, seed), {"rider": "yes", "pose": pose})
 
 
@@ -256,7 +256,7 @@ def _seat(frame: _Frame, turn_rad: float) -> Seat:
 
 
 def _stance(frame: _Frame, turn_rad: float) -> Seat:
-    """Of a rider who stands astride, the left foot on the ground beside the left pedal."""
+    """Contacts of a rider who stands astride, left foot on the ground next to the pedal."""
     x, y, z = frame.grip
     hips = (frame.saddle[0] + _WAITS_AHEAD_M, 0.04, _WAITS_HIPS_M)
     px, py, pz = _pedals(frame, turn_rad)[1]

@@ -2,9 +2,9 @@
 
 A ring runs from the middle of the front over the left side (y > 0) to the middle of the rear. Its
 plan is |x|^p + |y|^q = 1 (Lamé's superellipse), with other exponents in front than behind: p
-decides how early the side turns in, q how much the front bows. Patches made here carry
-(place along the ring, row) as texture coordinates, so that windows and lamps can be cut out
-by them; ``mirror_half`` drops them and adds the right half.
+decides how early the side turns in, q how much the front bows. Patches made here have (position
+along the ring, row) as texture coordinates, by which windows and lamps are cut out; ``mirror_half``
+drops them and adds the right half.
 """
 
 from collections.abc import Callable, Sequence
@@ -200,7 +200,7 @@ def paint(patch: Patch, slot: int, *further: Level, **bounds: Bounds) -> Patch:
 
 
 def refine_patch(patch: Patch, axis: str, places_m: Sequence[float]) -> Patch:
-    """The patch with edges added along planes, so that round holes come out round."""
+    """The patch with edges added along planes, which keep round holes round."""
     for place in places_m:
         patch = join_patches(split_patch(patch, _level(axis, place, 1.0))[:2])
     return patch
@@ -269,7 +269,7 @@ def mirror_half(half: Patch, swaps: Sequence[tuple[int, int]] = ()) -> Patch:
 
 
 def drop_uvs(patch: Patch) -> Patch:
-    """The patch without texture coordinates, but for those of printed slots."""
+    """The patch without texture coordinates, except on printed slots."""
     printed = np.isin(patch.slots, PRINTED)[:, None, None]
     return replace(patch, uvs=np.where(printed, patch.uvs, 0.0))
 

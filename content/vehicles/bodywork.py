@@ -32,7 +32,7 @@ _CUT = len(Slot)
 
 @dataclass(frozen=True)
 class Additions:
-    """What a vehicle has beyond its design.
+    """Additions to the design of a vehicle.
 
     Attributes:
         image_m: Shares of the length (front, rear) and heights (low, high) of the image on either

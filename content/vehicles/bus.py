@@ -32,7 +32,7 @@ _HALF_M = 1.275
 
 
 def bus(rng: VariantRng) -> Solid:
-    """A city bus with its doors on the right. Slots and keypoints are those of all vehicles."""
+    """A city bus with its doors on the right. Slots and keypoints as for all vehicles."""
     x, top = 0.5 * rng.between(11.2, 12.2, "depth_m"), rng.between(2.95, 3.08, "top_m")
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, "truck")
     livery = rng.choose(COLORS["liveries"]).split()

@@ -105,9 +105,9 @@ class Design:
 
     Attributes:
         length_m, width_m, height_m: Overall, without mirrors.
-        wheelbase_m, front_axle_m: Distance of the axles; of the front one from the bumper.
-        wheel_radius_m: Of the wheels.
-        clearance_m: Of the underbody.
+        wheelbase_m, front_axle_m: Distance between the axles; of the front axle from the bumper.
+        wheel_radius_m: Radius of the wheels.
+        clearance_m: Ground clearance of the underbody.
         nose_m, cowl_m, belt_m, tail_m: Height of the shoulder along the car.
         cowl, header, roof_end, rear_base: Shares where windscreen and rear window begin and end.
         waist_share, roof_share: Half width below the windows and of the roof over the body's.

@@ -77,7 +77,7 @@ def fit_antenna(design: Design) -> Iterator[Patch]:
 
 
 def fit_extras(design: Design) -> Iterator[Patch]:
-    """What the design has beyond other cars, roofs excepted."""
+    """Extras of the design, except on the roof."""
     for word in design.extras:
         if word in _EXTRAS:
             yield from _EXTRAS[word](design)

@@ -1,4 +1,4 @@
-"""What is seen through the windows of cars: floor, dashboard, steering wheel, seats."""
+"""Interiors of cars as seen through their windows: floor, dashboard, steering wheel, seats."""
 
 import math
 from collections.abc import Iterator

@@ -31,13 +31,13 @@ _ESTATES = ("estate", "compact_estate", "suv", "large_suv", "mpv", "box_mpv")
 
 
 def car(rng: VariantRng, steer_deg: float) -> Solid:
-    """A car. Slots and keypoints are those of all vehicles; positive steering turns to the left."""
+    """A car. Slots and keypoints as for all vehicles; positive steering turns to the left."""
     design = draw_car(*in_turn(CARS, rng.seed), rng)
     return make_vehicle(design, steer_deg, materials(rng, draw_paint(rng)))
 
 
 def van(rng: VariantRng, steer_deg: float) -> Solid:
-    """A van. Slots and keypoints are those of all vehicles; positive steering turns to the left.
+    """A van. Slots and keypoints as for all vehicles; positive steering turns to the left.
 
     Two of five panel vans carry the livery of a trade.
     """

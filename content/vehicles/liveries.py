@@ -55,7 +55,7 @@ def vehicle_livery(seed: int, kind: str) -> asset_types.TextureData:
     """The side of a vehicle, its front at the left border.
 
     Args:
-        seed: Of the firm's name and emblem.
+        seed: Seed of the firm's name and emblem.
         kind: ``trade`` or a service of ``liveries.yaml``.
 
     Raises:
@@ -113,7 +113,7 @@ def _draw_emblem(draw: ImageDraw, shape: str, ink: art.Color, ground: art.Color)
 
 
 def _find(kind: str, seed: int) -> Livery:
-    """The service's livery, or that of a firm with a drawn name."""
+    """The service's livery, or the livery of a firm with a drawn name."""
     if kind != TRADE:
         return SERVICES[kind]
     rng = variant_rng("vehicle_livery/trade", seed)

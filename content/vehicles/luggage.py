@@ -1,4 +1,4 @@
-"""Luggage of cyclists: bags beside the rear wheel and on the back."""
+"""Luggage of cyclists: bags at the rear wheel and on the back."""
 
 from gen_data.content.procedural import material_presets, patches
 from gen_data.content.procedural.surface_shapes import block

@@ -69,8 +69,8 @@ IN_EUROPE = {name: plate.weight for name, plate in FORMATS.items() if plate.weig
 _LETTERS = "ABCDEFGHJKLMNPRSTUVWXYZ"
 _CONSONANTS = "BCDFGHJKLMNPRSTVWXYZ"
 _DIGITS = "0123456789"
-# Plates of cars are 0.52 m by 0.11 m, those of motorcycles 0.18 m by 0.15 m, in two rows. Plates of
-# other proportions stand in the middle of a dark holder of that size.
+# Car plates are 0.52 m by 0.11 m, motorcycle plates 0.18 m by 0.15 m, in two rows. Plates of other
+# proportions are centred on a dark holder of that size.
 _DRAWN_PX = {1: (1300, 275), 2: (600, 500)}
 _SIZE_PX = {1: (256, 64), 2: (128, 128)}
 _BLUE, _YELLOW, _HOLDER = "#003399", "#ffcc00", "#101012"
@@ -122,7 +122,7 @@ def licence_plate(seed: int, rows: int, country: str, rear: int) -> TextureData:
     """The face of a plate.
 
     Args:
-        seed: Of the text.
+        seed: Seed of the text.
         rows: 1, or 2 with the first group above the others.
         country: A key of ``plate_formats.yaml``, or ``any``.
         rear: 1 for the plate behind the vehicle.

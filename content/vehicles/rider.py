@@ -30,7 +30,7 @@ class Seat:
     Attributes:
         hips: Middle of the hip joints.
         grips, soles: Positions of hands and feet.
-        lean_rad: Of the trunk, forward from upright.
+        lean_rad: Forward lean of the trunk from upright.
         full_face: Whether the helmet covers the face.
     """
 

@@ -1,6 +1,6 @@
-"""Dirt that gathers on vehicles: along sills, around and behind wheels, low in front, on the rear.
+"""Dirt on vehicles: along sills, around and behind wheels, low in front, on the rear.
 
-Wheels throw up what lies on the road, and the recirculating wake carries it onto the rear (Gaylard,
+Wheels throw up dirt from the road, and the recirculating wake carries it onto the rear (Gaylard,
 Kirwan and Lockerby, "Surface contamination of cars: a review", Proc. IMechE Part D 231(9), 2017).
 Widths and shares of the deposits are assumed, within a half.
 
@@ -32,20 +32,20 @@ SEEDS = 4
 AXLES = (0.62, -0.6)
 """Where the axles are along the image's side: 1 = front end, -1 = rear end of the vehicle."""
 _SIZE_PX = (64, 256)
-# Border of the image, so that coarse mip levels do not mix its opposite sides.
+# Border of the image: coarse mip levels must not mix its opposite sides.
 _MARGIN = 0.07
-# Roughness of what is clean over that of dirt, at most.
+# Largest ratio of the roughness of clean paint to the roughness of dirt.
 _CLEAN = 0.5
 _BRAKE_DUST: Vec3 = (0.035, 0.026, 0.02)
 _WHITE: Vec3 = (1.0, 1.0, 1.0)
 
 
 class Frame(NamedTuple):
-    """What the coordinates of dirt refer to [m].
+    """Dimensions to which the coordinates of dirt refer [m].
 
     Attributes:
-        bounds_m: Of the body, without mirrors: smallest and largest coordinates.
-        front_m, rear_m: Places of the axles along X.
+        bounds_m: Bounds of the body, without mirrors: smallest and largest coordinates.
+        front_m, rear_m: X of the axles.
     """
 
     bounds_m: tuple[Vec3, Vec3]
@@ -121,9 +121,9 @@ def road_dirt(seed: int, amount: float, paint: str) -> TextureData:
     """Paint under dirt, 256 x 64.
 
     Args:
-        seed: Of the pattern.
+        seed: Seed of the pattern.
         amount: 0 clean to 1 a winter without a wash.
-        paint: Colour of what is below, sRGB: ``rgb`` and six hexadecimal digits.
+        paint: Colour of the paint below, sRGB: ``rgb`` and six hexadecimal digits.
     """
     share = amount * dirt_share(seed % SEEDS)
     steps = np.arange(256) / 255.0
@@ -159,7 +159,7 @@ def dirt_share(seed: int) -> Float32:
 
 
 def _spray(along: Array, v: Array, axle: float) -> Array:
-    """Share from one wheel: what clings around the arch, and the plume behind it."""
+    """Share from one wheel: dirt that clings around the arch, and the plume behind it."""
     # The side's coordinates are about 2.2 m and 1.5 m long.
     x_m, z_m = 2.2 * (along - axle), 1.5 * v - 0.31
     arch = 0.5 * np.exp(-np.maximum(np.sqrt(x_m**2 + z_m**2) - 0.33, 0.0) / 0.09)

@@ -31,8 +31,8 @@ TRAILERS = ("box", "flat", "cargo", "boat")
 def parked_bicycle(rng: VariantRng) -> Solid:
     """A bicycle without rider along X: on its stand, against a wall at -Y, at a hoop, fallen over.
 
-    Some variants are rows of bicycles beside each other in a rack. Slots: those of the bicycles,
-    then the hoop's or rack's.
+    Some variants are rows of bicycles side by side in a rack. Slots: the bicycles', then the hoop's
+    or rack's.
     """
     kind = rng.turn(PARKINGS, "parking")
     steel = (GALVANISED if rng.chance(0.6) else material_presets.painted_material("#3b3d3f", 0.5),)
@@ -73,7 +73,7 @@ def parked_bicycle_facts(seed: int) -> Facts:
 def _stack(
     pieces: list[tuple[list[Patch], tuple[Material, ...]]],
 ) -> tuple[list[Patch], tuple[Material, ...]]:
-    """Pieces with materials of their own as parts with slots of one list; equal ones are shared."""
+    """Pieces with separate materials as parts with slots of one list; equal ones are shared."""
     materials: list[Material] = []
     parts = []
     for patches, own in pieces:
@@ -88,7 +88,7 @@ def _stack(
 
 
 def _hoop() -> Patch:
-    """A hoop of 0.7 x 0.8 m, as street_furniture's racks have them, beside the bicycle."""
+    """A hoop of 0.7 x 0.8 m next to the bicycle, as in the racks of street_furniture."""
     bend = [(0.35, 0.0), (0.35, 0.65), (0.31, 0.76), (0.2, 0.8)]
     path = [(-x, 0.0, z) for x, z in bend] + [(x, 0.0, z) for x, z in bend[::-1]]
     return rod(path, 0.024, 7).moved(-0.05, -0.16)
@@ -162,7 +162,7 @@ def trailer(rng: VariantRng) -> Solid:
     """A one-axle car trailer along X, its drawbar at +X: a tarpaulin box, flat, cargo or boat.
 
     Boxes of 2.0-2.6 x 1.1-1.3 m (assumed from makers' catalogues). Slots: body, second, rim, tyre,
-    taillights, tarpaulin, steel, and those of the wheels.
+    taillights, tarpaulin, steel, and the slots of the wheels.
     """
     kind = rng.turn(TRAILERS, "kind")
     half, floor = 0.5 * rng.between(2.0, 2.6, "length_m"), 0.52

@@ -27,7 +27,7 @@ _HALF_M = 1.2
 
 
 def tractor(rng: VariantRng) -> Solid:
-    """A tractor without implements. Slots and keypoints are those of all vehicles."""
+    """A tractor without implements. Slots and keypoints as for all vehicles."""
     x = 0.5 * rng.between(4.1, 4.8, "depth_m")
     rear, front = rng.between(0.84, 0.95, "rear_m"), rng.between(0.55, 0.68, "front_m")
     top = rng.between(2.75, 3.05, "top_m")

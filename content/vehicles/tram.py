@@ -39,7 +39,7 @@ _SILL_M, _LINTEL_M = 1.0, 2.62
 
 
 def tram(rng: VariantRng) -> Solid:
-    """A tram with doors on both sides. Slots and keypoints are those of all vehicles."""
+    """A tram with doors on both sides. Slots and keypoints as for all vehicles."""
     half, x = 0.5 * rng.turn(_WIDTHS_M, "width_m"), 0.5 * rng.between(27.0, 35.0, "length_m")
     joints = np.linspace(-x, x, (3 if rng.seed % 2 else 5) + 1)[1:-1].tolist()
     main, second = (hex_to_linear(code) for code in rng.choose(COLORS["liveries"]).split())

@@ -35,7 +35,7 @@ _SECOND = {"tanker": "tankers", "tipper": "tippers", "flatbed": "tippers",
 
 
 def truck(rng: VariantRng) -> Solid:
-    """A truck. Slots and keypoints are those of all vehicles; the load is the second paint.
+    """A truck. Slots and keypoints as for all vehicles; the load is the second paint.
 
     Randomizers paint the cab; boxes, tanks and beds keep the colour of their kind.
     """

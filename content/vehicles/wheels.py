@@ -29,9 +29,9 @@ class WheelDesign:
             holes.
         arms: Number of spokes or slots.
         width: Width of a spoke or slot.
-        inner, outer: From where to where spokes or slots reach.
+        inner, outer: Radii between which spokes or slots extend.
         spread_deg: Angle from the axis of an arm to each of a pair, or between its ends.
-        rim_share: Radius of the rim over that of the tyre.
+        rim_share: Radius of the rim divided by the radius of the tyre.
     """
 
     kind: Literal["spokes", "twins", "forks", "twists", "cover", "plate"]
@@ -64,7 +64,7 @@ def wheel(radius_m: float, width_m: float, design: str) -> Patch:
         lathe(hub, 10, Slot.RIM),
         *_face(look, rim, half),
     ]
-    # A lathe's axle is Z: turned so that its top faces +Y, and a corner of the tread down.
+    # A lathe's axle is Z: turned until its top faces +Y, and a corner of the tread faces down.
     return join_patches(parts).rotated("z", 0.5 * math.pi).rotated("x", -0.5 * math.pi)
 
 
@@ -121,7 +121,7 @@ class Axles:
     Attributes:
         front_m, rear_m: x of the axles.
         hub_y_m: y of the middle of a left wheel.
-        radius_m: Of the wheels.
+        radius_m: Radius of the wheels.
         tyre_m: Width of the tyres; twin tyres behind are as wide as two.
         arch_m: Radius of the wheel arches.
         design: Name of the wheels' design.

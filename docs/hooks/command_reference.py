@@ -24,7 +24,7 @@ def command_page() -> str:
 
 
 def _commands(command: click.Command, name: str) -> Iterator[tuple[str, click.Command]]:
-    """A command and, below it, those of a group, with their full names."""
+    """A command and, below it, the commands of a group, with their full names."""
     yield name, command
     if isinstance(command, click.Group):
         context = click.Context(command, info_name=name)

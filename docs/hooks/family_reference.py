@@ -9,7 +9,7 @@ from gen_data.assets.family import Family
 from gen_data.assets.library import Library, open_library
 
 VARIANTS = 4
-"""Variants made per family: ranges hardly depend on further ones, and all would take minutes."""
+"""Variants made per family: further ones barely change ranges, and all would take minutes."""
 
 
 def family_page() -> str:
@@ -17,8 +17,8 @@ def family_page() -> str:
     library = open_library()
     lines = [
         "# Families of assets",
-        "An asset id may ask for any parameter of its family: `desk?seed=3&width_m=1.6`"
-        " ([assets](../assets.md#sizes-and-choices)). Ranges are those of the first"
+        "An asset id may set any parameter of its family: `desk?seed=3&width_m=1.6`"
+        " ([assets](../assets.md#sizes-and-choices)). Ranges are taken over the first"
         f" {VARIANTS} variants; a variant whose other draws leave less room refuses more, and"
         " `gen-data describe FAMILY` prints the same texts.",
     ]

@@ -21,7 +21,7 @@ from gen_data.core.plugins import PluginTable
 KINDS = {
     "element": ("Elements", "elements", "An element adds its part to the scene of a template."),
     "randomizer": ("Randomizers", "randomizers", "A randomizer varies the scene."),
-    "sensor": ("Sensors", "sensors", "A sensor reports what the scene looks like to it."),
+    "sensor": ("Sensors", "sensors", "A sensor measures the scene."),
     "annotation": ("Annotations", "annotations", "An annotation is a label to compute."),
     "exporter": ("Exporters", "exporters", "An exporter writes the data set in a format."),
     "renderer": ("Renderers", "render", "The renderer makes the images; the section `render:`."),
@@ -111,7 +111,7 @@ def _template_files() -> list[Path]:
 
 
 def own_names(table: PluginTable[Any]) -> list[str]:
-    """Names of our own plug-ins, sorted; those of installed packages are left out."""
+    """Names of built-in plug-ins, sorted, without plug-ins of installed packages."""
     return sorted(table.entries)
 
 
@@ -150,7 +150,7 @@ def field_unit(name: str) -> str:
 def _index() -> str:
     lines = [
         "# Reference",
-        "Generated from the sources: texts, fields and examples are those of `gen-data describe`.",
+        "Generated from the sources; `gen-data describe` prints the same texts and examples.",
         "| kind | names |",
         "|---|---|",
     ]
@@ -280,7 +280,7 @@ def _reflow(text: str) -> str:
 
 
 def _prose(text: str) -> str:
-    """Text of a docstring as Markdown; outside of code, ``<`` is no tag."""
+    """Text of a docstring as Markdown; outside code, ``<`` does not begin a tag."""
     parts = text.replace("``", "`").split("`")
     parts[::2] = [part.replace("<", "&lt;") for part in parts[::2]]
     return "`".join(parts)

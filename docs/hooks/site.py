@@ -1,7 +1,7 @@
 """Hooks of MkDocs: pages from files of the repository, and the generated reference.
 
-Files outside of docs/ become pages, so that links in Markdown work in the repository and on the
-site alike. Linked files of other types are shown as source pages.
+Files outside docs/ become pages: links in Markdown work both in the repository and on the site.
+Linked files of other types are shown as source pages.
 """
 
 import posixpath
@@ -14,7 +14,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[2]
-# MkDocs loads hooks by path: the packages of the checkout are found like those of scripts in it.
+# MkDocs loads hooks by path: the checkout's packages are found as for scripts in it.
 sys.path.insert(0, str(ROOT))
 
 from docs.hooks.command_reference import command_page  # noqa: E402
@@ -92,7 +92,7 @@ def _is_document(file: File) -> bool:
 
 
 def _linked_files(page: Path) -> set[str]:
-    """Paths in the repository that a page links to and that are no pages of the site."""
+    """Paths in the repository that a page links to and that are not pages of the site."""
     text = CODE.sub("", page.read_text("utf-8"))
     origin = page.relative_to(ROOT).as_posix()
     targets = (_repository_path(match[2], origin) for match in LINK.finditer(text))

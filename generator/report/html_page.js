@@ -351,7 +351,7 @@ function parameters() {
       name.toLowerCase().includes(search.value.toLowerCase()) && (stands || !unusual));
     const whole = unusual || search.value || !more.parentElement;
     more.hidden = Boolean(whole);
-    // Those that stand out come first among the few that are shown at once.
+    // Outliers come first among the few that are shown at once.
     const first = whole ? wanted : [...wanted].sort((x, y) => y.stands - x.stands).slice(0, CARDS);
     for (const item of cards) item.card.hidden = !first.includes(item);
   };

@@ -1,7 +1,8 @@
-"""Completions and help at a place of a configuration, from its JSON Schema.
+"""Completions and help at a position in a configuration, from its JSON Schema.
 
-The text is usually broken where one types: a mark takes the place of the word at the cursor, and if
-the whole text with it is no YAML, the text up to the cursor is completed by its open brackets.
+The text is usually invalid while the user types: a mark replaces the word at the cursor, and if the
+whole text with the mark is not YAML, the text up to the cursor is completed with its closing
+brackets.
 """
 
 import re
@@ -64,12 +65,12 @@ _SHARED = {"$ref": f"#/$defs/{SHARED_VALUE}"}
 
 
 def complete(text: str, offset: int, inherited: Node | None = None) -> tuple[int, list[Proposal]]:
-    """Words that fit at an offset of a text.
+    """Words that fit at an offset in a text.
 
     Args:
         text: Text of the editor.
-        offset: Of the cursor [characters].
-        inherited: The latest resolved document, which has the types of inherited items.
+        offset: Position of the cursor [characters].
+        inherited: The latest resolved document, for the types of inherited items.
 
     Returns:
         Offset at which the word at the cursor begins, and the proposals.
@@ -125,7 +126,7 @@ def _last_word(before: str) -> str:
 def _find_mark(
     text: str, start: int, end: int, *, as_key: bool | None = None
 ) -> tuple[Node, FieldPath, bool] | None:
-    """Tree of the text with a mark in place of the word, the path of its parent or of its value.
+    """Tree of the text with a mark in place of the word, and the path of its parent or value.
 
     Returns:
         Tree, path and whether the mark is a key; None if nothing near the cursor is YAML.
@@ -159,7 +160,7 @@ def _path_of_mark(node: Node, path: FieldPath, is_key: bool) -> FieldPath | None
 
 
 def _closing(before: str) -> str:
-    """Brackets that close those which a text leaves open, as far as its last plain line tells."""
+    """Closing brackets for those left open in a text, judged up to its last plain line."""
     open_: list[str] = []
     quote = ""
     for number, char in enumerate(before):
@@ -177,11 +178,11 @@ def _closing(before: str) -> str:
 
 
 def _below(tree: Node, path: FieldPath, inherited: Node | None) -> list[FieldSchema]:
-    """Alternatives of the value at a path, without those that the types in the tree exclude."""
+    """Alternatives of the value at a path, except the ones excluded by types in the tree."""
     places, node, above = list(_options(root_schema())), tree, ""
     for part in path:
         child = node.get(part) or node
-        # Overrides of a template's elements by name are as the elements of a list.
+        # Overrides of a template's elements by name have the form of list items.
         is_item = isinstance(part, int) or above == "elements"
         places = _children(places, 0 if is_item else part)
         kind = _kind(child, str(part), above, inherited) if is_item else child.get("type")
@@ -194,7 +195,7 @@ def _below(tree: Node, path: FieldPath, inherited: Node | None) -> list[FieldSch
 
 
 def _children(places: Iterable[FieldSchema], part: str | int) -> list[FieldSchema]:
-    """Alternatives of a field, or of an item of a list, of any of some alternatives."""
+    """Alternatives of a field, or of a list item, under any of the given alternatives."""
     options = [option for place in places for option in _options(place)]
     return [c for o in options if _has(o, part) for c in _options(o.child(part))]
 
@@ -206,7 +207,7 @@ def _has(option: FieldSchema, part: str | int) -> bool:
 
 
 def _kind(node: Node, key: str, section: str, inherited: Node | None) -> Node | None:
-    """Type of an item: its own, or that of the inherited item of its name."""
+    """Type of an item, stated by itself or by the inherited item with the same name."""
     own, name = node.get("type"), key if section == "elements" else node_name(node)
     items = inherited.entries[section].items if inherited and section in inherited.entries else ()
     named = [item.get("type") for item in items if node_name(item) in (name, key)]

@@ -1,4 +1,4 @@
-"""Controls of an item's fields: ranges from the schema, densities beside drawn values."""
+"""Controls of an item's fields: ranges from the schema, densities and drawn values."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 SECTIONS = ("elements", "randomizers", "sensors")
 """Sections whose items have controls by name."""
 GENERAL = "general"
-"""Stands for the fields of a configuration outside of these sections."""
+"""Stands for the fields of a configuration outside these sections."""
 RANGES = ("uniform", "log_uniform", "uniform_integer")
 HIDDEN = frozenset({"type", "name"})
 BINS = 24
 DRAWS = 2000
-"""Draws that a density is made of."""
+"""Number of draws from which a density is estimated."""
 
 
 @dataclass(frozen=True)
 class Control:
-    """A field of an item, as a slider, range, switch or set of choices.
+    """A field of an item, shown as a slider, range, switch or set of choices.
 
     Attributes:
         field: Name of the field.
@@ -41,8 +41,8 @@ class Control:
             ``weights`` (a distribution over names) or ``text``, for anything else.
         value: Plain data of the configuration, or the default.
         form: Name of its distribution; empty for a constant.
-        low, high, step: Of the slider.
-        legal: Legal values, which may go beyond the slider; empty = any, or no numbers.
+        low, high, step: Ends and step of the slider.
+        legal: Legal values, which may exceed the slider; empty = any, or not numeric.
         options: Legal values of a choice; outcomes of weights.
         help: Type, default and description.
         place: ``file:line`` that gives the value; empty for a default.
@@ -178,14 +178,14 @@ def outcomes(value: Any) -> dict[str, float]:
 def _extent(
     field: FieldSchema, value: Any, form: str, *, is_angle: bool
 ) -> tuple[float, float, float]:
-    """Ends and step of a slider: the legal values, as far as they are of the value's magnitude."""
+    """Ends and step of a slider: the legal values within the order of magnitude of the value."""
     if form == "probability":
         return 0.0, 1.0, 0.01
     numbers = list(_numbers(value))
     limits = next((one.limits for one in (field, *field.branches) if one.limits), None)
     largest = max((abs(number) for number in numbers), default=0.0) or 1.0
     low, high = (-math.inf, math.inf) if limits is None else (limits.low, limits.high)
-    # A whole turn of angles; else multiples of the value, and all that is legal if that is little.
+    # A full turn for angles; otherwise multiples of the value, or the whole legal range if small.
     reach = 360.0 if is_angle else 4.0 * largest
     low = low if low >= -reach * 5 else -reach
     high = high if high <= reach * 5 else reach
@@ -211,7 +211,7 @@ def _numbers(value: Any) -> Iterator[float]:
 
 @dataclass(frozen=True)
 class Density:
-    """A declared distribution and the values drawn of it, over the same bins or names.
+    """A declared distribution and values drawn from it, over the same bins or names.
 
     Attributes:
         labels: Centres of the bins, or names.
@@ -226,7 +226,7 @@ class Density:
 
 
 def density(distribution: Distribution[Any], drawn: Sequence[Any]) -> Density | None:
-    """Density of a distribution of numbers or names beside drawn values; None for others."""
+    """Density of a distribution of numbers or names, and drawn values; None for others."""
     key = to_flow_yaml(distribution.to_yaml())
     expected = _EXPECTED.get(key, lambda: _draw_many(distribution))
     if not all(isinstance(one, (int, float, str)) for one in expected):

@@ -1,4 +1,4 @@
-"""Everything that the tabs of one server share."""
+"""State shared by the tabs of one server."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gen_data.lab.edit.files import Folders
 from gen_data.lab.edit.workers import Activity, Job, Ticket, Workers
 
 PICTURES_BYTES = 96 << 20
-"""Encoded pictures that are kept for browsers."""
+"""Number of encoded pictures kept for browsers."""
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Pictures:
 
 @dataclass
 class Desk:
-    """Everything that the tabs share.
+    """State shared by all tabs.
 
     Attributes:
         source: File or data set to open; None = the start page.

@@ -1,4 +1,4 @@
-"""The text of a configuration as the page shows it: faults at their places, values with origins."""
+"""The text of a configuration as the page shows it: faults by position, values by origin."""
 
 import re
 import warnings
@@ -50,7 +50,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Analysis:
-    """What a text means.
+    """Meaning of a text: its configuration, or its faults.
 
     Attributes:
         config: None if there are faults.

@@ -33,7 +33,7 @@ gen-data edit out/tabletop
     "folders",
     multiple=True,
     type=click.Path(path_type=Path, exists=True, file_okay=False),
-    help="A further folder that the page may read and write [default: that of CONFIG].",
+    help="A further folder that the page may read and write [default: the folder of CONFIG].",
 )
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option("--port", type=int, default=0, help="Port [default: one of the file, if free].")

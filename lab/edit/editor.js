@@ -37,7 +37,7 @@ function completions(tab) {
   };
 }
 
-// Faults are marks of the browser: a property of the server's element would bring its text along,
+// Faults are marks of the browser: a property of the server's element would also send its text,
 // which is older than the latest keys.
 const setFaults = CM.StateEffect.define();
 const faults = CM.StateField.define({
@@ -83,7 +83,7 @@ function explanation(tab) {
   });
 }
 
-// A draft outlives a reload and a server that was started again.
+// A draft survives a reload and a restart of the server.
 function keepDraft(key) {
   return CM.EditorView.updateListener.of((update) => {
     if (update.docChanged) sessionStorage.setItem(key, update.state.doc.toString());
@@ -95,7 +95,7 @@ function keepDraft(key) {
 }
 
 // The colours of CodeMirror's own style, mixed with white in the dark by editor.css: the themes of
-// the package have less contrast than WCAG asks for.
+// the package have less contrast than WCAG requires.
 const colors = CM.HighlightStyle.define(
   CM.defaultHighlightStyle.specs.map((spec) =>
     spec.color ? { ...spec, color: `color-mix(in srgb, ${spec.color} var(--gd-own), white)` } : spec,

@@ -20,7 +20,7 @@ _BOM = "\ufeff"
 
 @dataclass(frozen=True)
 class Folders:
-    """Folders that the page may use, with all that is below them.
+    """Folders that the page may use, including all subfolders.
 
     Attributes:
         roots: Resolved paths.
@@ -29,12 +29,12 @@ class Folders:
     roots: tuple[Path, ...]
 
     def contains(self, path: Path) -> bool:
-        """Whether a path is in one of the folders, all links followed."""
+        """Whether a path is in one of the folders after all links are followed."""
         resolved = path.resolve()
         return any(resolved.is_relative_to(root) for root in self.roots)
 
     def with_references(self, text: str, file: Path) -> "Folders":
-        """Also the folders that a file of the user names, as its run would read them."""
+        """The same folders and those named by a file of the user, which its run would read."""
         try:
             tree = parse_yaml(text, str(file))
         except GenDataError:
@@ -44,10 +44,10 @@ class Folders:
         return Folders((*self.roots, *sorted(found - set(self.roots))))
 
     def refuse_outside(self, text: str, file: str) -> None:
-        """Refuse a text that names a file or folder outside.
+        """Refuse a text that names a file or folder outside these folders.
 
         Raises:
-            ConfigError: it does, at its place; or the text is no valid document.
+            ConfigError: it names one, with its position; or the text is not a valid document.
         """
         for position, path in _references(parse_yaml(text, file), Path(file).parent):
             if not self.contains(path):
@@ -62,7 +62,7 @@ def _references(tree: Node, folder: Path) -> Iterator[tuple[Position, Path]]:
     for child in tree.children.values():
         yield from _references(child, folder)
     text = tree.content
-    # Not only texts with slashes: a link next to the file may lead anywhere.
+    # Also texts without slashes: a link next to the file may lead anywhere.
     if isinstance(text, str) and text:
         try:
             path = folder / Path(text).expanduser()
@@ -73,12 +73,12 @@ def _references(tree: Node, folder: Path) -> Iterator[tuple[Position, Path]]:
 
 
 class ChangedError(StorageError):
-    """A file is no longer as it was read."""
+    """A file has changed since it was read."""
 
 
 @dataclass(frozen=True)
 class OpenedFile:
-    """A file as it was read, and its text for an editor, whose lines end in LF.
+    """A file as it was read, and its text for an editor, with lines that end in LF.
 
     Attributes:
         content: The bytes as text; None if there is no such file yet.
@@ -98,7 +98,7 @@ class OpenedFile:
 
         Args:
             text: Text of the editor.
-            overwrite: Also if the file has changed since it was read.
+            overwrite: Write even if the file has changed since it was read.
 
         Raises:
             ChangedError: it has changed, or is gone, by another tab or program.
@@ -127,7 +127,7 @@ def read_file(path: Path) -> OpenedFile:
     """Read a configuration; a file that does not exist is empty.
 
     Raises:
-        ConfigError: it is no text of a reasonable size.
+        ConfigError: it is not a text of a reasonable size.
     """
     try:
         if path.stat().st_size > MAX_FILE_BYTES:

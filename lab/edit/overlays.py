@@ -41,7 +41,7 @@ _MODALITIES = {Modality.CAMERA: "photo", Modality.LIDAR: "scan", Modality.DEVICE
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What a picture shows.
+    """Content of a picture.
 
     Attributes:
         kind: One of ``KINDS``.
@@ -59,7 +59,7 @@ class View:
         return "photo" if KINDS[self.kind] else self.kind
 
     def of(self, sensor: str) -> "View":
-        """The same view of a sensor."""
+        """The same view, of a given sensor."""
         return replace(self, sensor=sensor)
 
 
@@ -70,7 +70,7 @@ def first_kind(sensor: SensorInfo) -> str:
 
 
 def find_empty(sample: Sample | LabelledImages, view: View) -> frozenset[str]:
-    """Layers that a view shows, or its kind, of which the sample has nothing."""
+    """Layers of a view, or its kind, for which the sample has no data."""
     reading = sample.capture.readings.get(view.sensor)
     if reading is None:
         cloud = sample.capture.clouds.get(view.sensor)
@@ -80,7 +80,7 @@ def find_empty(sample: Sample | LabelledImages, view: View) -> frozenset[str]:
     channel = _channel(reading, view.kind)
     if view.kind == "mirrors":
         is_empty = channel is None or not reading.channels[channel].any()
-    elif view.kind == "layers":  # The first layer is the picture as it is seen anyway.
+    elif view.kind == "layers":  # The first layer is the picture itself.
         is_empty = channel is None or not reading.channels[channel][..., 1:].any()
     else:
         is_empty = channel is None
@@ -109,7 +109,7 @@ def _has(sample: Sample | LabelledImages, sensor: str, layer: str) -> bool:
 def draw_view(
     sample: Sample | LabelledImages, view: View, views: Mapping[str, str], unit: float
 ) -> Image:
-    """Draw what a view shows, uint8 [h, w, 3].
+    """Draw a view, uint8 [h, w, 3].
 
     Args:
         sample: With a reading of the view's sensor.

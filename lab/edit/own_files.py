@@ -59,8 +59,8 @@ class Checked:
         jpeg: Picture: of a mesh with a mug, and for large objects a person, for scale; of a
             photograph with its horizon and a grid on its ground.
         size_px: Width and height of a photograph; None for a mesh.
-        standpoint: That the entry of a photograph follows from.
-        tilt_roll_deg: How far the camera of a photograph looks down, and the slope of its horizon.
+        standpoint: Standpoint from which the entry of a photograph follows.
+        tilt_roll_deg: Downward tilt of a photograph's camera, and slope of its horizon [deg].
     """
 
     section: str
@@ -74,10 +74,10 @@ class Checked:
 
 @dataclass(frozen=True)
 class Misplaced:
-    """A photograph whose ground cannot be used as it is.
+    """A photograph whose ground is not usable as given.
 
     Attributes:
-        text: Reason, and the control that changes it with the value that it needs.
+        text: Reason, and the control to change with the value it needs.
         jpeg: Picture with the horizon, and a grid on the part of the ground below it.
     """
 
@@ -90,11 +90,11 @@ class Misplaced:
 
 @dataclass(frozen=True)
 class CheckFile:
-    """Check of one file in a process of its own limits.
+    """Check of one file in a process with limits.
 
     Attributes:
         entry: Entry of a mesh in the index without the file, such as ``{unit: mm, up: y}``.
-        standpoint: Of a photograph.
+        standpoint: Standpoint of a photograph.
     """
 
     path: Path
@@ -102,7 +102,7 @@ class CheckFile:
     standpoint: Standpoint = photographs.UNKNOWN
 
     def run(self, studio: Studio) -> Checked | Misplaced:
-        """Import the file as a run would, in a folder of its own."""
+        """Import the file as a run would, in a separate folder."""
         del studio
         with temporary_folder("edit") as folder:
             shutil.copyfile(self.path, folder / self.path.name)
@@ -113,7 +113,7 @@ class CheckFile:
 
 
 def plain_name(given: str) -> str:
-    """Name of a file without the folders that a browser, or a stranger, puts before it."""
+    """Name of a file without folders that a browser, or an attacker, prepends."""
     name = PurePosixPath(given.replace("\\", "/")).name
     return "" if name.startswith(".") or not name.isprintable() else name
 
@@ -124,10 +124,10 @@ def is_photograph(name: str) -> bool:
 
 
 def check_mesh(folder: Path, name: str, changes: dict[str, Any]) -> Checked:
-    """Check a mesh in a folder without an index, which is written.
+    """Check a mesh in a folder without an index; the index is written.
 
     Raises:
-        AssetError: it cannot be used; the text tells why.
+        AssetError: it cannot be used; the text states why.
     """
     from gen_data.assets.readers import MESH_SUFFIXES
     from gen_data.cli.own_meshes import guess_unit
@@ -144,13 +144,13 @@ def check_mesh(folder: Path, name: str, changes: dict[str, Any]) -> Checked:
 
 
 def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked | Misplaced:
-    """Check a photograph in a folder without an index, which is written.
+    """Check a photograph in a folder without an index; the index is written.
 
-    Without a tilt, its horizon is found from its edges; where they show none, or one below all
-    ground, a tilt is assumed. A ground that was not given ends below the horizon.
+    Without a tilt, the horizon is estimated from edges in the image; if they show none, or one
+    below the whole ground, a tilt is assumed. A ground that was not given ends below the horizon.
 
     Raises:
-        AssetError: it cannot be used; the text tells why.
+        AssetError: it cannot be used; the text states why.
     """
     from gen_data.assets.image_decoding import decode_image
 
@@ -182,7 +182,7 @@ def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked
 def _with_ground(
     locate: Callable[[Standpoint], Plate], standpoint: Standpoint
 ) -> tuple[Plate, Standpoint]:
-    """A photograph's camera, and the standpoint with a tilt and a ground where it needs them."""
+    """A photograph's camera, and the standpoint with an assumed tilt and ground if necessary."""
     try:
         plate = locate(standpoint)
     except AssetError as error:
@@ -214,7 +214,7 @@ def _check(folder: Path, section: str, entry: dict[str, Any]) -> Checked:
 
 
 def as_walls(checked: Checked) -> Checked:
-    """A checked photograph as a texture, which walls show."""
+    """A checked photograph as a texture for walls."""
     name = str(checked.entry["file"])
     return replace(checked, section="textures", entry={"file": name, "tags": [_word(name)]})
 
@@ -267,7 +267,7 @@ def _shrink(image: Image) -> Image:
 def keep_file(folder: Path, path: Path, checked: Checked) -> None:
     """Copy a checked file to the user's folder, and add it to its index.
 
-    A file that is there is not copied; its entry is replaced, as after another angle was given.
+    An existing file is not copied; its entry is replaced, for example after a change of an angle.
 
     Raises:
         AssetError: another file of that name is there.
@@ -300,15 +300,15 @@ def _entry_number(text: str, checked: Checked) -> int | None:
 
 
 def add_to_scene(text: str, config: Config | None, checked: Checked) -> str:
-    """The text of a configuration with a checked file in its scene.
+    """The text of a configuration with a checked file added to its scene.
 
-    A mesh becomes a group of objects on the first surface, of which scenes draw one to three. A
-    photograph stands behind the scene, and begins one in an empty text; as a texture, it covers
-    the walls.
+    A mesh becomes a group of objects on the first surface; each scene draws one to three of them. A
+    photograph becomes the background of the scene, or of a new scene if the text is empty; as a
+    texture, it covers the walls.
 
     Args:
-        text: Of the editor.
-        config: What it means; None for a text with faults, or an empty one.
+        text: Text of the editor.
+        config: Its configuration; None for a text with faults, or an empty one.
         checked: The file.
 
     Raises:
@@ -350,13 +350,13 @@ def add_to_scene(text: str, config: Config | None, checked: Checked) -> str:
         text = text_edits.append_item(text, "elements", {"name": f"own_{name}", **group})
     else:
         text = text_edits.set_value(text, ("elements", f"own_{name}"), group)
-    # Without a randomizer, it would lie in one place in every scene.
+    # Without a randomizer, it would lie at the same place in every scene.
     drawn = {"type": "objects", "name": f"own_{name}", "count": {"uniform_integer": [1, 3]}}
     return text_edits.append_item(text, "randomizers", drawn)
 
 
 def _own_list(text: str) -> bool:
-    """Whether the text itself lists the elements, instead of overriding those of a template."""
+    """Whether the text lists the elements itself instead of overriding elements of a template."""
     own = parse_yaml(text or "{}", "").get("elements")
     return own is not None and bool(own.items)
 

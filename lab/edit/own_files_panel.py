@@ -1,4 +1,4 @@
-"""Panel of the user's meshes and photographs: each has a card, with what its file does not tell."""
+"""Panel of the user's meshes and photographs: a card each, with facts that its file lacks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TILT_HINT = "0: level; 30: from a chair; 60: standing at the table"
 ROLL_HINT = "the horizon falls to the right; negative: to the left"
 HFOV_HINT = "phones: 65 held level, 51 upright"
 REACH = 0.2
-"""Distance from a corner at which it is taken, as a share of the picture's edges."""
+"""Largest distance at which the pointer grabs a corner, as a share of the picture's edges."""
 HANDLE = (
     '<circle cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}" fill="#ffdc00" stroke="#0a1923" '
     'stroke-width="{w:.1f}" /><circle cx="{x:.1f}" cy="{y:.1f}" r="{w:.1f}" fill="#0a1923" />'
@@ -72,13 +72,13 @@ class OwnFilesPanel:
             return
         folder = Path(tempfile.mkdtemp(dir=self._tab.desk.scratch))
         await event.file.save(folder / name)
-        event.sender.reset()  # Its own list of files says nothing that the card does not.
+        event.sender.reset()  # The list of the upload widget only repeats facts of the card.
         with self._body:
             OwnFile(self._tab, folder / name)
 
 
 class OwnFile:
-    """Card of one file: its picture, what was found, and what the file does not tell."""
+    """Card of one file: its picture, findings, and facts that the file does not contain."""
 
     def __init__(self, tab: Tab, path: Path) -> None:
         self._tab, self._path = tab, path
@@ -91,7 +91,7 @@ class OwnFile:
         self._is_seen = False
         self._ranges: list[Any] = []
         self._numbers: dict[str, Any] = {}
-        self._tilt_deg, self._roll_deg = 0.0, 0.0  # Of the latest check.
+        self._tilt_deg, self._roll_deg = 0.0, 0.0  # State of the latest check.
         self._is_showing = self._is_assumed = False
         self._card = ui.element("div").classes("gd-field")
         self._card.props["data-file"] = path.name
@@ -142,13 +142,13 @@ class OwnFile:
             self._scroll()
 
     def _remove(self) -> None:
-        """Take the card and the copy of its file away; the text stays as it is."""
+        """Remove the card and the copy of its file; the text is unchanged."""
         self._tab.desk.forget(self._jobs)
         shutil.rmtree(self._path.parent, ignore_errors=True)
         self._card.delete()
 
     def _take_over(self, used: Standpoint) -> None:
-        """Show the ground that a check has assumed."""
+        """Show the ground that a check assumed."""
         is_shortened = self._standpoint.ground is None and used.ground not in (None, GROUND)
         if self._found and is_shortened and not self._is_assumed:
             self._facts.text += SHORTENED
@@ -166,7 +166,7 @@ class OwnFile:
             self._tab.client.run_javascript(f"getHtmlElement({self._card.id})?.scrollIntoView()")
 
     def _build_choices(self) -> None:
-        """What may be changed, once: a slider must not be replaced under the hand."""
+        """Build the controls once: a slider must not be replaced while it is dragged."""
         if self._choices.default_slot.children:
             return
         with self._choices:
@@ -238,7 +238,7 @@ class OwnFile:
         return self._tilt_deg if self._is_assumed else self._standpoint.tilt_deg
 
     def _show_angles(self) -> None:
-        """Show tilt and roll of the check, where they were not given."""
+        """Show tilt and roll of the check if the user did not give them."""
         self._is_showing = True
         is_given = self._standpoint.tilt_deg is not None
         shown = self._standpoint.roll_deg if is_given else self._roll_deg
@@ -260,7 +260,7 @@ class OwnFile:
         self._stand("ground", rectangle(across, down))
 
     def _drag(self, event: Any) -> None:
-        """Move the corner that the pointer has taken."""
+        """Move the corner that the pointer has grabbed."""
         if not own_files.is_photograph(self._path.name):
             return
         width, height = self._size_px
@@ -295,7 +295,7 @@ class OwnFile:
         old = self._standpoint
         new = replace(old, **{field: value})
         if old.tilt_deg is None and field in ("tilt_deg", "roll_deg"):
-            # Both are given, or none: the other one is as it was found.
+            # Either both are given or none: the other one keeps its estimate.
             found = {"tilt_deg": self._tilt_deg, "roll_deg": self._roll_deg}
             new = replace(old, **{**found, field: value})
         if self._is_showing or new == old:

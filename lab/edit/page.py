@@ -1,4 +1,4 @@
-"""Widgets of the page; what they show and change is in the session."""
+"""Widgets of the page; their data is in the session."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ HERE = Path(__file__).parent
 PAUSE_S = 0.02
 """Pause in typing after which a text is read."""
 LOOK_S = 2.0
-"""Time between two looks at the file on disk."""
+"""Time between two checks of the file on disk."""
 VIEWS = {
     "photo": "photograph",
     "depth": "depth",
@@ -283,7 +283,7 @@ class EditorTab:
         self._task = asyncio.create_task(self._follow())
 
     async def _follow(self) -> None:
-        """Read the text whenever it has changed, the newest only."""
+        """Read the text whenever it has changed; only the newest version."""
         while True:
             await self._changed.wait()
             await asyncio.sleep(PAUSE_S)
@@ -389,7 +389,7 @@ class EditorTab:
         return "not saved" if self.session.is_changed else "saved"
 
     async def _look(self) -> None:
-        """Tell whether another program has changed the file, or taken it away."""
+        """Report whether another program has changed or removed the file."""
         found = await asyncio.to_thread(self.session.find_change)
         if found != self._on_disk:
             self._on_disk = found
@@ -400,7 +400,7 @@ class EditorTab:
         self._changed.set()
 
     def edit(self, text: str) -> None:
-        """Take a text that a control has changed."""
+        """Accept a text that a control has changed."""
         self.editor.set_value(text)
         self._changed.set()
 
@@ -481,7 +481,7 @@ class EditorTab:
                 except GenDataError as error:
                     ui.notify(str(error), type="negative")
                     return
-                # The address, and the key of unsaved text, have the name of the file.
+                # The address and the key of unsaved text contain the name of the file.
                 ui.run_javascript(f"window.genDataEdit.forget({f'gen-data:{old}'!r})")
                 ui.navigate.to(f"/?open={quote(self.session.name)}")
 
@@ -497,7 +497,7 @@ class EditorTab:
 
 
 def describe_empty(names: list[str]) -> str:
-    """What the shown samples lack, in words; empty for nothing."""
+    """Labels and pictures that the shown samples lack, in words; empty if none."""
     words = [LAYER_NAMES.get(name) or VIEWS[name] for name in names]
     return f"these samples have no {', no '.join(words)}" if words else ""
 

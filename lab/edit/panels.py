@@ -1,4 +1,4 @@
-"""Panels below the grid: controls, statistics, origins; a picture in full size."""
+"""Panels below the grid: controls, statistics, origins; a picture at full size."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Tab(Protocol):
 
 
 class ControlsPanel:
-    """Controls of one item, and plots of what it draws."""
+    """Controls of one item, and plots of its draws."""
 
     def __init__(self, tab: Tab) -> None:
         self._tab = tab
@@ -66,7 +66,7 @@ class ControlsPanel:
         self._cells: dict[str, Any] = {}
         self._places: dict[str, Any] = {}
         self._plots: dict[str, Any] = {}
-        self._written: str | None = None  # The latest text, if a control has made it.
+        self._written: str | None = None  # The latest text, if a control has produced it.
         self._select = (
             ui.select({}, on_change=self._picked, label="item")
             .props('dense options-dense aria-label="Item"')
@@ -105,7 +105,7 @@ class ControlsPanel:
             self._item = (controls.GENERAL, "")
         found = {one.field: one for one in controls.list_controls(config, *self._item)}
         old, self._controls = self._controls, found
-        # While a slider is dragged, it must not be replaced under the hand.
+        # A slider must not be replaced while it is dragged.
         is_own = self._tab.session.text == self._written
         self._written = self._written if is_own else None
         if list(found) != list(old) or self._item != self._built:
@@ -169,7 +169,7 @@ class ControlsPanel:
             self._build_slider(control, change)
 
     def _build_range(self, control: controls.Control, change: Any) -> None:
-        """A slider with two thumbs, and a field of each end for the keyboard."""
+        """A slider with two thumbs, and an input field for each end."""
         low, high = control.value[control.form]
         both = {"min": low, "max": high}
         fields: dict[str, Any] = {}
@@ -230,7 +230,7 @@ class ControlsPanel:
 
         def toggle(option: Any, event: Any) -> None:
             if is_one:
-                # One is selected: the others are not, and it cannot be left.
+                # Exactly one option is selected, and it cannot be deselected.
                 if event.value:
                     change(option)
                 for other, chip in chips.items():
@@ -283,13 +283,13 @@ class ControlsPanel:
         found = controls.find_distribution(config, section, name, field)
         values = controls.three_values(control, found)
         if base is None or values is None:
-            ui.notify("there is no picture to vary yet, or the field is no number")
+            ui.notify("there is no picture to vary yet, or the field is not a number")
             return
         place = "" if section == controls.GENERAL else section
         self._tab.vary(vary(base, place, name, field, values))
 
     def refresh_plots(self) -> None:
-        """Draw what the shown samples drew beside the declared densities."""
+        """Plot draws of the shown samples over the declared densities."""
         for field in self._plots:
             self._plot_drawn(field)
 
@@ -304,7 +304,7 @@ class ControlsPanel:
 
 
 def _place(control: controls.Control) -> str:
-    """Where a value comes from, and which are legal."""
+    """Origin of a value, and the legal values."""
     legal = f"; legal: {control.legal}" if control.legal else ""
     return (control.place or "default") + legal
 
@@ -346,7 +346,7 @@ def _plot(shown: controls.Density | None) -> dict[str, Any]:
 
 
 class StatisticsPanel:
-    """Statistics of the shown samples beside those of real pictures, and the fit to them."""
+    """Statistics of the shown samples and of real pictures, and the fit to them."""
 
     def __init__(self, tab: Tab) -> None:
         self._tab = tab
@@ -380,7 +380,7 @@ class StatisticsPanel:
         self.refresh()
 
     def _allow(self) -> None:
-        """Allow a fit where there are real pictures and samples, and none runs."""
+        """Allow a fit if there are real pictures and samples, and no fit is running."""
         if self._tab.desk.real is not None:
             is_idle = self._process is None and not self._is_fitting
             self._start.set_enabled(bool(is_idle and self._real and self._tab.session.shown))
@@ -408,7 +408,7 @@ class StatisticsPanel:
             table(tuple(header), statistics.rows(ours, real)[:60])
 
     async def _fit(self) -> None:
-        """Run the command match on the saved file; its result is a file that extends it."""
+        """Run the command match on the saved file; the result is a file that extends it."""
         session, real = self._tab.session, self._tab.desk.real
         path = session.file.path
         if session.is_changed:
@@ -465,7 +465,7 @@ class StatisticsPanel:
             ui.link(f"report {report.name}", f"/edit/report/{address}", new_tab=True)
 
     def _end_fit(self) -> None:
-        """End the process of the fit, which then has written nothing."""
+        """End the process of the fit, which then writes nothing."""
         process, self._process = self._process, None
         if process is not None:
             process.kill()
@@ -536,13 +536,13 @@ def object_rows(shown: Shown) -> list[tuple[str, str, str, str]]:
 
 
 def object_colors(shown: Shown) -> list[str]:
-    """CSS colours in which the labels of the objects of a picture are drawn; empty = unknown."""
+    """CSS colours of the labels drawn for the objects of a picture; empty = unknown."""
     colors = [id_color(o.number) if o.number else None for o in shown.objects]
     return [f"rgb{color}" if color else "" for color in colors]
 
 
 def show_full(tab: Tab, order: Order, shown: Shown) -> None:
-    """Show a sample in full size with its draws."""
+    """Show a sample at full size with its draws."""
     shape = tab.session.size_px
     with ui.dialog(value=True).props("maximized") as dialog, ui.card().style("width: 100%"):
         with ui.element("div").classes("gd-row"):
@@ -560,7 +560,7 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
                 image.style("width: 100%")
             else:
                 image.style(f"aspect-ratio: {shape[0]} / {shape[1]}; width: {shape[0]}px")
-            # Until it is rendered, the small picture takes its place.
+            # Until it is rendered, the small picture is shown.
             image.props["src"] = tab.desk.pictures.put(shown.jpeg)
             progress = ui.linear_progress(show_value=False).props(
                 'indeterminate aria-label="rendering"'
@@ -588,7 +588,8 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
             image.props["src"] = tab.desk.pictures.put(jpeg)
             image.props["data-full"] = "ready"
             image.update()
-            # Of the configured image: a small picture has other sizes, and misses small objects.
+            # Sizes in the configured image: a small picture has other sizes, and misses small
+            # objects.
             with objects:
                 header = ("class", "object", "size px", "occlusion")
                 table(header, object_rows(result), object_colors(result))

@@ -1,7 +1,7 @@
-"""Photographs that are dropped into the page, as backgrounds of scenes: their entries and scenes.
+"""Photographs dropped into the page as backgrounds of scenes: their entries and scenes.
 
-A photograph does not tell how high its camera was, nor where things may stand in it. Both have
-sliders; the picture of the check shows the horizon and a grid on the ground that follow from them.
+A photograph contains neither the height of its camera nor the area where objects may stand. Both
+have sliders; the picture of the check shows the resulting horizon and a grid on the ground.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ assets: {{folders: [{folder}]}}
 elements:
   - {{type: plate, name: plate, photos: [{photo}]}}
   - type: objects
-    name: things
+    name: clutter
     on: plate
     count: 4
     placement: scatter
     assets: {{ids: [mug, banana, apple, bowl]}}
 randomizers:
   - {{type: plate, name: plate, photos: [{photo}]}}
-  - {{type: objects, name: things, count: {{uniform_integer: [2, 6]}}}}
+  - {{type: objects, name: clutter, count: {{uniform_integer: [2, 6]}}}}
 sensors:
   - {{type: plate_camera, name: color, size_px: [{width}, {height}]}}
 annotations: [boxes2d, instance_masks, visibility]
@@ -46,7 +46,7 @@ exporters:
 IMAGE_PX = 640
 """Longest edge of the images of that text."""
 RENDERED = "rendered"
-"""Tag of the photographs that come with gen-data, which an own one replaces."""
+"""Tag of the photographs shipped with gen-data; a user's photograph replaces it."""
 
 
 Corners = tuple[tuple[float, float], ...]
@@ -59,22 +59,22 @@ def rectangle(across: tuple[float, float], down: tuple[float, float]) -> Corners
 
 
 GROUND = rectangle((0.1, 0.9), (0.45, 0.95))
-"""Assumed; on most photographs of tables and roads."""
+"""Assumed ground; valid for most photographs of tables and roads."""
 LEAST_GROUND = 0.1
 """Least height of a ground below the horizon, as a share of the photograph's."""
 LOWEST_DEG = 3.0
-"""Least angle below the horizon of what is taken for ground: distances grow without end there."""
+"""Smallest angle of ground below the horizon, where distances grow without bound."""
 
 
 @dataclass(frozen=True)
 class Standpoint:
-    """What a photograph does not tell of its camera and ground.
+    """Facts about camera and ground that a photograph does not contain.
 
     Attributes:
         height_m: Height of the camera above the ground, which may be the top of a table.
-        tilt_deg: How far it looks down; None = found from straight edges.
-        hfov_deg: Horizontal field of view; None = of the EXIF data, else found with the tilt; with
-            a given tilt, ``HFOV_DEG``.
+        tilt_deg: Downward tilt; None = estimated from straight edges.
+        hfov_deg: Horizontal field of view; None = from EXIF data, otherwise estimated with the
+            tilt; with a given tilt, ``HFOV_DEG``.
         ground: Corners of the ground, shares of the photograph's width from the left and height
             from the top; None = ``GROUND``, without its part above the horizon.
         roll_deg: Slope of the horizon, which falls to the right; only with a tilt.
@@ -119,17 +119,17 @@ class Standpoint:
 
 
 UNKNOWN = Standpoint()
-"""Before the user has said anything."""
+"""Standpoint before the user has set any control."""
 
 
 def _assumed_hfov_deg(share: float) -> float:
-    """Field of view across a photograph whose width is a share of its longest edge."""
+    """Horizontal field of view of a photograph whose width is a share of its longest edge."""
     half = math.atan(share * math.tan(math.radians(0.5 * HFOV_DEG)))
     return round(math.degrees(2.0 * half), 1)
 
 
 def below_horizon(plate: Plate, ground: Corners) -> Corners | None:
-    """Corners of a ground, those above the horizon moved straight down; None if one cannot be."""
+    """Corners of a ground, moved straight down if above the horizon; None if impossible."""
     width_px, height_px = plate.size_px
     reach_m = plate.T_world_camera.translation_m[2] / math.tan(math.radians(LOWEST_DEG))
     lowered = []
@@ -144,7 +144,7 @@ def below_horizon(plate: Plate, ground: Corners) -> Corners | None:
 
 
 def remedy(plate: Plate, ground: Corners) -> str:
-    """What to change for a ground with a corner above the horizon."""
+    """Advice for a ground with a corner above the horizon."""
     highest = min(y for _, y in ground)
     rise = math.atan((0.5 - highest) * plate.size_px[1] / plate.focal_px)
     tilt_deg = math.ceil(math.degrees(rise) + LOWEST_DEG)
@@ -168,13 +168,13 @@ def begin_scene(folder: str, photo: str, size_px: tuple[int, int]) -> str:
         size_px: Its width and height; images have their shape.
     """
     scale = min(1.0, IMAGE_PX / max(size_px))
-    # Video encoders, and many networks, want multiples of 16.
+    # Video encoders and many networks require multiples of 16.
     width, height = (max(16, round(edge * scale / 16) * 16) for edge in size_px)
     return SCENE.format(folder=folder, photo=photo, width=width, height=height)
 
 
 def show_behind(text: str, document: Node, photo: str) -> str:
-    """The text of a configuration with one more photograph behind its scenes.
+    """The text of a configuration with another photograph behind its scenes.
 
     Raises:
         ConfigError: its scenes have no plate, or its photographs have no place in the text.
@@ -200,5 +200,5 @@ def show_behind(text: str, document: Node, photo: str) -> str:
 
 
 def is_empty(text: str) -> bool:
-    """Whether a text has nothing but comments."""
+    """Whether a text contains only comments."""
     return not any(line.strip() and not line.strip().startswith("#") for line in text.splitlines())

@@ -1,4 +1,4 @@
-"""Scenes that a changed text makes as before, kept with all that they depend on.
+"""Scenes that a changed text leaves as before, kept with all their inputs.
 
 Randomizers and physics are pure functions of the scene, their settings and their random stream. A
 call with the same scene (the same object), the same settings and the same stream has the same
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 V = TypeVar("V")
 
 KEPT = 1500
-"""Results that are kept: a street has forty randomizers, and a grid up to 24 scenes."""
+"""Number of results kept: a street has forty randomizers, and a grid up to 24 scenes."""
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Memory:
     """The latest results by their arguments.
 
     Attributes:
-        limit: Most results; those that were used longest ago go first.
+        limit: Largest number of results; the least recently used is dropped first.
     """
 
     limit: int = KEPT
@@ -41,7 +41,7 @@ class Memory:
         Args:
             source: Compared by identity; it is kept with the result.
             settings: Everything else that the result depends on.
-            make: The function; what it raises is not kept.
+            make: The function; its exceptions are not kept.
         """
         key = id(source), settings
         known = self._kept.get(key)
@@ -60,9 +60,9 @@ class RememberingPhysics:
     """A physics engine that settles no scene twice.
 
     Attributes:
-        engine: Of some settings.
-        settings: Their text.
-        latest: The scene that it settled last.
+        engine: The engine.
+        settings: Its settings as text.
+        latest: The scene settled last.
     """
 
     engine: PhysicsEngine

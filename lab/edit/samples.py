@@ -63,7 +63,7 @@ TEXTS_KEPT = 4
 ENGINES_KEPT = 2
 """Renderers and physics engines of the latest settings: some tens of megabytes of assets each."""
 SCENES_KEPT = 12
-"""Packed scenes: a grid of 24 has as many for each of two processes."""
+"""Number of packed scenes: of a grid of 24, each of two processes renders 12."""
 SAMPLES_KEPT = 32
 """Latest small samples, on which other labels are drawn without rendering."""
 DRAWS_MAX = 300
@@ -76,7 +76,7 @@ class Order:
     """Order of one picture.
 
     Attributes:
-        text, file: Of the configuration, as for ``document.analyse``.
+        text, file: Text and path of the configuration, as for ``document.analyse``.
         index: Number of the sample.
         overrides: ``KEY=VALUE`` each.
         width_px: Largest width of the rendered image; 0 = as configured.
@@ -98,7 +98,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Order of one sample with all sensors in full size, for the Rerun viewer."""
+    """Order of one sample with all sensors at full size, for the Rerun viewer."""
 
     order: Order
 
@@ -125,8 +125,8 @@ class Labelled:
     """A labelled object of a picture, in pixels of the configured image.
 
     Attributes:
-        name: In the scene: that of its element and a number; empty = unknown.
-        number: Of its instance, which gives its labels their colour; 0 = unknown.
+        name: Name in the scene, made of the element's name and a number; empty = unknown.
+        number: Instance number, which selects the colour of its labels; 0 = unknown.
     """
 
     category: str
@@ -148,7 +148,7 @@ class Shown:
         brightness: Mean grey value of the photograph in [0, 1]; None without one.
         per_scene, per_view: Numbers of samples.
         cpu_s: Processor time.
-        empty: Layers of the view, or its kind, of which the sample has nothing.
+        empty: Layers of the view, or its kind, for which the sample has no data.
     """
 
     jpeg: bytes
@@ -168,7 +168,7 @@ class Taken:
     """A sample with the reading of one sensor.
 
     Attributes:
-        factor: Columns of the rendered image over those of the configured one.
+        factor: Columns of the rendered image divided by columns of the configured image.
     """
 
     sample: Sample
@@ -178,11 +178,11 @@ class Taken:
 
 @dataclass
 class Kept:
-    """Assets, engines and scenes that stay from text to text: opening takes longer than a sample.
+    """Assets, engines and scenes kept between texts: opening takes longer than a sample.
 
     Attributes:
-        engines: Of physics, by settings; one of pybullet is a connection, of which a process has
-            at most 1024.
+        engines: Physics engines by settings; a pybullet engine is a connection, and a process
+            has at most 1024 of them.
     """
 
     library: Library
@@ -193,7 +193,7 @@ class Kept:
     memory: Memory = field(default_factory=Memory)
 
     def renderer(self, settings: str, make: Callable[[], Renderer]) -> Renderer:
-        """The renderer of some settings, which keeps the scenes of a grid."""
+        """The renderer with the given settings; it keeps the scenes of a grid."""
 
         def opened() -> Renderer:
             from gen_data.renderers.warp.renderer import WarpRenderer
@@ -206,7 +206,7 @@ class Kept:
         return self.renderers.get(settings, opened)
 
     def physics(self, settings: PhysicsConfig) -> RememberingPhysics:
-        """The physics engine of some settings."""
+        """The physics engine with the given settings."""
         text = repr(settings)
         return self.engines.get(
             text,
@@ -229,7 +229,7 @@ class Studio:
             GenDataError: as a run of the configuration would.
         """
         started_s = time.process_time()
-        # Own files may be added again with another pose of the camera, or another unit.
+        # The user may add a file again with another camera pose, or another unit.
         own = _index_time_ns(Path(order.file).parent / ASSETS)
         text = repr((order.text, order.file, order.overrides, order.pinned, own))
         opened = self._opened.get(text, lambda: self._open(order))
@@ -275,8 +275,8 @@ class Studio:
     def _open(self, order: Order, *, first_scene_only: bool = True) -> OpenedText:
         """Open a text, by default with the first outcome of its shared values checked.
 
-        Categories that only other scenes have are then without number: scans show them in the
-        colour of what has no label.
+        Categories that only other scenes have then have no number: scans show them in the colour of
+        unlabelled points.
         """
         name, once = Path(order.file).stem, first_scene_only
         config = parse_config(
@@ -289,7 +289,7 @@ class Studio:
 
 
 def _index_time_ns(folder: Path) -> int:
-    """When the index of a folder was written last; 0 without one. A newer one has other assets."""
+    """Modification time of a folder's index; 0 without one. A newer index has other assets."""
     index = folder / "assets.yaml"
     return index.stat().st_mtime_ns if index.exists() else 0
 
@@ -321,7 +321,7 @@ class OpenedText:
             open_renderer=lambda: renderer,
         )
         self._pipeline.memory = kept.memory
-        # Everything that a nominal scene depends on, and some more.
+        # All inputs of a nominal scene, and some more.
         apart = ("randomizers", "annotations", "exporters", "render")
         self._frame = repr({k: v for k, v in config.document.plain().items() if k not in apart})
         self._resources = ExitStack()
@@ -347,7 +347,7 @@ class OpenedText:
         return replace(view, sensor=name, kind=kind)
 
     def annotations(self, view: View) -> dict[str, AnyAnnotator]:
-        """Annotators that a view shows, and those of the statistics."""
+        """Annotators for a view, and for the statistics."""
         names = {LAYERS[layer] for layer in view.layers} | {"boxes2d"}
         names |= {"visibility"} & self._config.annotations.keys()
         table = plugin_tables.ANNOTATIONS
@@ -389,7 +389,7 @@ class OpenedText:
         return Taken(read, self._plain_draws(), factor)
 
     def _with_small_camera(self, scene: Scene, name: str, width_px: int) -> tuple[Scene, float]:
-        """The scene with at most ``width_px`` columns of a camera (0 = its own); their share."""
+        """The scene with at most ``width_px`` camera columns (0 = all), and their share."""
         camera = next((one for one in scene.cameras if one.name == name), None)
         if camera is None or not 0 < width_px < camera.intrinsics.width_px:
             return scene, 1.0
@@ -413,7 +413,7 @@ class OpenedText:
         return annotate_reading(scene, reading, annotators, smaller, self.library)
 
     def _kept_scene(self, accepted: AcceptedScene) -> AcceptedScene:
-        """The same with the scene that an earlier text had: its views are known by this object."""
+        """The same with the scene object of an earlier text: views are cached by this object."""
         settings = ("finish", self.info.categories)
         scene = self._memory.get(self._physics.latest, settings, lambda: accepted.scene)
         return replace(accepted, scene=scene)
@@ -438,7 +438,7 @@ class OpenedText:
         return nominal, observed, scene.sensors
 
     def _known_nominal(self, nominal: Scene) -> Scene:
-        """The same scene as an earlier text had it, as after a change of an exposure or a label."""
+        """An equal scene of an earlier text, as after a change of an exposure or a label."""
         content = hashlib.sha256(pickle.dumps(nominal)).digest()
         return self._memory.get(self.library, ("nominal", content), lambda: nominal)
 
@@ -463,7 +463,7 @@ class RememberingPipeline(Pipeline):
 
 
 class Observed:
-    """A randomizer whose latest draws are kept: those of rejected attempts are forgotten."""
+    """A randomizer that keeps its latest draws, without draws of rejected attempts."""
 
     motion_duration_s: float | None = None
 

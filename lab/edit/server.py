@@ -36,10 +36,10 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 
 
 class Guard:
-    """Lets requests pass that have the token, and that name a host of this server.
+    """Accepts requests that have the token and name a host of this server.
 
     The first request has the token in its query; a cookie has it from then on. Names of other hosts
-    are refused, as a page of another site may have its name resolved to this machine.
+    are refused, because another site may resolve its name to this machine.
     """
 
     def __init__(self, app: Any, token: str, hosts: frozenset[str], port: int) -> None:
@@ -105,17 +105,17 @@ async def _reply(send: Send, status: int, headers: list[tuple[bytes, bytes]], bo
 def usual_port(source: Path | None) -> int:
     """A port of the dynamic range (RFC 6335) that stays the same for a file.
 
-    Browsers keep drafts by address and port: those of a server that was started again are found.
+    Browsers store drafts by address and port: a restarted server finds its drafts.
     """
     digest = hashlib.sha256(str(source and source.resolve()).encode()).digest()
     return 49152 + int.from_bytes(digest[:4], "big") % 16384
 
 
 def free_port(host: str, port: int, wish: int = 0) -> int:
-    """The port; for 0 the wished one if it is free, else any.
+    """The port; for 0 the preferred one if it is free, otherwise any.
 
     Raises:
-        ConfigError: it is taken, or the address is none of this machine.
+        ConfigError: it is in use, or the address does not belong to this machine.
     """
     if not port and wish:
         with suppress(ConfigError):
@@ -133,7 +133,7 @@ def free_port(host: str, port: int, wish: int = 0) -> int:
 
 
 async def _wait_for(host: str, port: int) -> None:
-    """Until the server accepts connections."""
+    """Wait until the server accepts connections."""
     while True:
         with suppress(OSError):
             _, writer = await asyncio.open_connection(host, port)

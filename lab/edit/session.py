@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.workers import Ticket
 
 BEGIN = (
-    "Nothing is here yet. Begin with a shipped configuration, whose name completes what you type "
-    "behind 'extends: ', or drop a photograph on 'Own files'."
+    "The file is empty. Begin with a shipped configuration, whose name is completed after "
+    "'extends: ', or drop a photograph on 'Own files'."
 )
 BEGINNINGS = ("tabletop.yaml", "rooms.yaml", "street.yaml", "photo_plates.yaml")
-"""Configurations that an empty file is offered."""
+"""Configurations offered for an empty file."""
 SLOTS = (4, 6, 8, 12, 16, 24)
 EACH = ("scene", "view", "step")
-"""What differs from one picture to the next."""
+"""Quantities that can vary from one picture to the next."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Variation:
 
     Attributes:
         field: Dotted path, as for ``--set``.
-        values: Plain data, one a picture.
+        values: Plain data, one value per picture.
         kept: Names and values of the other draws of the same plug-in.
         drawn: Name of the draw that the values replace; empty = the field is a constant.
     """
@@ -87,9 +87,9 @@ class Session:
     Attributes:
         file: The file as it was last read or written.
         text: Text of the editor.
-        analysis: Of the text; its configuration is the latest valid one.
-        results: By slot; a result stays until that of a newer text replaces it.
-        outdated: Slots whose result is of an older text.
+        analysis: Analysis of the text; its configuration is the latest valid one.
+        results: Results by slot; a result stays until a newer text's result replaces it.
+        outdated: Slots whose result belongs to an older text.
     """
 
     file: OpenedFile
@@ -116,7 +116,7 @@ class Session:
         return self.file.content is None or self.text != self.file.text
 
     def find_change(self) -> str:
-        """What another program has done to the file since it was read; empty for nothing."""
+        """Changes by another program to the file since it was read, in words; empty if none."""
         try:
             content = read_file(self.file.path).content
         except GenDataError:
@@ -170,7 +170,7 @@ class Session:
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """Errors of the text, and those of the scenes that its pictures could not be made of."""
+        """Errors of the text, and of the scenes whose pictures could not be rendered."""
         if self.analysis.faults:
             return self.analysis.faults
         refused = (r for k, r in sorted(self.results.items()) if k not in self.outdated)
@@ -179,7 +179,7 @@ class Session:
 
     @property
     def empty(self) -> list[str]:
-        """Kinds of labels and pictures of which no picture of the current text has anything."""
+        """Kinds of labels and pictures that are empty in every picture of the current text."""
         found = [one.empty for one in self.shown]
         return sorted(frozenset.intersection(*found)) if found else []
 
@@ -191,7 +191,7 @@ class Session:
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Shape of the pictures to come: of the camera that is shown, else of the first one."""
+        """Shape of the next pictures: from the shown camera, otherwise from the first one."""
         sensors = self.config.probes[0].sensors if self.config else ()
         sized = [one for one in sensors if getattr(one, "size_px", None)]
         wanted = [one for one in sized if one.name == self.grid.view.sensor]
@@ -202,7 +202,7 @@ class Session:
         """The text with another value of a field of a named item, or of a section (no name).
 
         Raises:
-            ConfigError: the field has no place of its own in the text.
+            ConfigError: the field has no separate place in the text.
         """
         return text_edits.set_value(self.text, [section, *([name] if name else []), *path], value)
 
@@ -236,9 +236,9 @@ class Session:
 def vary(shown: Shown, section: str, name: str, field_: str, values: Sequence[Any]) -> Variation:
     """The sample of a picture with several values of one field of an item.
 
-    A value takes the place of the drawn one, whose random numbers are drawn all the same: other
-    draws stay. Those of the same randomizer that are one number are kept also where another
-    attempt has to be made; those of other plug-ins have streams of their own.
+    A value replaces the drawn one, whose random numbers are still consumed: other draws are
+    unchanged. Draws of the same randomizer that are single numbers are kept even if another attempt
+    is necessary; other plug-ins have separate streams.
 
     Args:
         shown: Picture of the sample.

@@ -65,7 +65,7 @@ def _is_kept(gallery: dict[str, bytes], name: str, text: str) -> bool:
 
 
 class StartPage:
-    """The start page of one tab; pictures are rendered one after the other, and kept."""
+    """The start page of one tab; pictures are rendered one after another, and kept."""
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk

@@ -1,4 +1,4 @@
-"""Statistics of the shown pictures beside those of real pictures."""
+"""Statistics of the shown pictures and of real pictures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gen_data.lab.matching.real_files import choose_evenly, find_files
 from gen_data.lab.study.real_pictures import read_image, read_real
 
 PICTURES_MAX = 60
-"""Real pictures that are read, chosen evenly."""
+"""Number of real pictures read, evenly spaced."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Class:
 
 @dataclass(frozen=True)
 class Summary:
-    """Some pictures.
+    """Statistics of a set of pictures.
 
     Attributes:
         brightness: Mean grey value in [0, 1]; None without photographs.

@@ -1,7 +1,7 @@
-"""Edits of single values in the text of a configuration; every other byte stays as it was.
+"""Edits of single values in the text of a configuration; all other bytes are unchanged.
 
-The text is never written from its values again: comments, order, quotes and line ends are those of
-its author.
+The text is never regenerated from its values: the author's comments, order, quotes and line ends
+remain.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,25 +21,25 @@ Path = Sequence[str | int]
 
 
 def set_value(text: str, path: Path, value: Any) -> str:
-    """The text with another value of a field, which is added if it is absent.
+    """The text with a new value of a field, which is added if absent.
 
     Args:
         text: A valid document.
-        path: Field, such as ``("randomizers", "clutter", "count")``. A list without an item of a
+        path: Field, such as ``("randomizers", "clutter", "count")``. A list without an item of that
             name gets one that overrides the inherited item.
         value: Plain data.
 
     Raises:
-        ConfigError: the text is no valid document, or the field has no place of its own in it.
+        ConfigError: the text is not a valid document, or has no separate place for the field.
     """
     return _Text(text).set(path, value)
 
 
 def append_item(text: str, section: str, item: Any) -> str:
-    """The text with one more item in the list of a section, which is added if it is absent.
+    """The text with another item in the list of a section, which is added if absent.
 
     Raises:
-        ConfigError: the text is no valid document, or the section is no list.
+        ConfigError: the text is not a valid document, or the section is not a list.
     """
     return _Text(text).append(section, item)
 
@@ -93,7 +93,7 @@ class _Text:
 
     @staticmethod
     def _key(tree: Any, part: str | int) -> str | int:
-        """Index of the item of a name in a list; any other part as it is."""
+        """Index of the list item with a given name; any other part unchanged."""
         if isinstance(part, int) or not tree.items:
             return part
         names = [node_name(item) for item in tree.items]
@@ -197,4 +197,4 @@ def _plain(key: str | int) -> str:
 
 def _refuse(path: Path) -> NoReturn:
     field = ".".join(map(str, path))
-    raise ConfigError(f"{field}: has no place of its own in the file; edit its text instead")
+    raise ConfigError(f"{field}: has no separate place in the file; edit its text instead")

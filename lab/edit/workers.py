@@ -1,7 +1,7 @@
-"""Processes that render for the page: the newest jobs of a tab replace its waiting ones.
+"""Processes that render for the page: new jobs of a tab replace its waiting ones.
 
-A job that nobody waits for any more is left to finish for a moment, because most take less time
-than a new process; then its process is ended. A process that crashes costs one picture.
+A job that has become obsolete may run on for a moment, because most jobs take less time than the
+start of a process; then its process is ended. A crash of a process costs one picture.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.samples import Studio
 
 GRACE_S = 1.5
-"""Time that a job has after it was replaced."""
+"""Time that a job may run on after it was replaced."""
 LIMIT_S = 120.0
 """Longest time of a job."""
 ACTIVITY_S = 0.25
-"""Least time between two activities that are told."""
+"""Smallest time between two reported activities."""
 TRIES = 2
 """A job whose process crashes is tried once more: the kernel may have run out of memory."""
 MEMORY_BYTES = 3 << 30
 """Resident memory from which a process is replaced between two jobs."""
 NICENESS = 0
-"""Of the processes, for the page and the browser to go first."""
+"""Niceness of the processes: the page and the browser have priority."""
 
 _START = (
     "import os, sys; scratch, *sys.path[:] = sys.argv[1:]; "
@@ -54,13 +54,13 @@ class Job(Protocol):
     """Work for a process; picklable."""
 
     def run(self, studio: Studio) -> Any:
-        """Do it, with the engines of the process."""
+        """Do the work with the engines of the process."""
         ...
 
 
 @dataclass(frozen=True)
 class Ready:
-    """A job that tells that the process has imported everything."""
+    """A job that reports that the process has finished its imports."""
 
     def run(self, studio: Studio) -> None:
         """Nothing."""
@@ -99,7 +99,7 @@ class Reply:
 
 @dataclass(frozen=True)
 class Activity:
-    """A message of a process before its reply: what it prepares, and how many before."""
+    """A message of a process before its reply: its activity, and the number of earlier ones."""
 
     text: str
     count: int
@@ -110,7 +110,7 @@ class Queue:
     """Waiting jobs by tab; tabs take turns.
 
     Attributes:
-        later: Clients whose jobs wait for those of all others.
+        later: Clients whose jobs run after the jobs of all others.
     """
 
     waiting: OrderedDict[str, deque[Ticket]] = field(default_factory=OrderedDict)
@@ -118,7 +118,7 @@ class Queue:
     later: set[str] = field(default_factory=set)
 
     def replace(self, client: str, tickets: Sequence[Ticket], *, later: bool = False) -> None:
-        """Replace all jobs of a client; those that run are outdated then."""
+        """Replace all jobs of a client; running ones become outdated."""
         (self.later.add if later and tickets else self.later.discard)(client)
         self.current[client] = frozenset(tickets)
         self.waiting.pop(client, None)
@@ -133,9 +133,9 @@ class Queue:
         self.waiting.setdefault(ticket.client, deque()).appendleft(again)
 
     def take(self) -> Ticket | None:
-        """The next job, of the client that was served longest ago; None if none waits.
+        """The next job, from the least recently served client; None if none waits.
 
-        Those of ``later`` are last.
+        Clients in ``later`` come last.
         """
         if not self.waiting:
             return None
@@ -148,18 +148,18 @@ class Queue:
         return ticket
 
     def is_current(self, ticket: Ticket) -> bool:
-        """Whether somebody waits for the result."""
+        """Whether the result is still needed."""
         return ticket in self.current.get(ticket.client, ())
 
 
 class Workers:
-    """Processes and the jobs that wait for them. A context manager: leaves no process behind.
+    """Processes and the jobs that wait for them. A context manager that ends every process.
 
     Args:
         count: Number of processes.
         deliver: Receives each ticket that is current, and its result; called in threads.
-        hear: Receives each ticket that is current, and what its process prepares for it.
-        scratch: Folder for temporary files, which processes that are ended leave; None = the usual.
+        hear: Receives each ticket that is current, and the activities of its process.
+        scratch: Folder for temporary files, which killed processes leave; None = the usual one.
     """
 
     def __init__(
@@ -257,7 +257,7 @@ class Workers:
     def _end_later(
         self, ticket: Ticket, child: subprocess.Popen[bytes], delay_s: float
     ) -> threading.Event:
-        """End a process if it still does this job after a time; the event tells that it was."""
+        """End a process if it still does this job after a time; the event is then set."""
         ended = threading.Event()
 
         def end() -> None:
@@ -320,7 +320,7 @@ def work() -> None:
     # Scenes are many objects that stay: Python searches them for garbage at every 700 new ones.
     gc.set_threshold(50_000, 20, 100)
     source, replies = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    # What native code prints must not reach the replies.
+    # Output of native code must not mix with the replies.
     os.dup2(2, 1)
     studio = Studio()
     activity.listen(_Reporter(replies).tell)
@@ -334,14 +334,14 @@ def work() -> None:
 
 
 class _Reporter:
-    """Sends activities, a few in a second."""
+    """Sends activities, at most a few per second."""
 
     def __init__(self, replies: Any) -> None:
         self._replies, self._lock = replies, threading.Lock()
         self._count, self._next_s = 0, 0.0
 
     def tell(self, text: str) -> None:
-        """Send one, unless the last was just sent."""
+        """Send an activity, unless the last one was just sent."""
         with self._lock:
             self._count += 1
             if time.monotonic() >= self._next_s:

@@ -130,7 +130,7 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
         assert "[32, 228], [80, 120], [288, 108], [288, 228]" in kept
         assert "roll_deg: 4" in kept
         page.click(".gd-tile >> nth=0")
-        page.wait_for_selector(".q-dialog td >> text=/^(things|own_my_wedge)/")
+        page.wait_for_selector(".q-dialog td >> text=/^(clutter|own_my_wedge)/")
         page.click(".q-dialog button:has-text('Close')")
         page.get_by_role("button", name="Save", exact=True).click()
         page.wait_for_selector("[role=status]:text-is('saved')")

@@ -108,7 +108,7 @@ def test_an_alias_is_edited_by_hand() -> None:
         ("a: {b: &x 1, c: *x}\n", ("a", "c")),
         ("a: [&x 1, *x]\n", ("a", 1)),
     ):
-        with pytest.raises(ConfigError, match="has no place of its own in the file"):
+        with pytest.raises(ConfigError, match="has no separate place in the file"):
             set_value(text, path, 3)
 
 

@@ -51,7 +51,7 @@ EVALUATIONS: dict[str, tuple[Evaluation, str]] = {
 }
 """Function, and the repository of its code; ``""``: a package."""
 PROGRAMS: dict[str, Evaluation] = {"CULane": lanes.by_culane, "OpenLane": lanes.by_openlane_2d}
-"""Functions that run a program of the user: C++ that its repository says how to build."""
+"""Functions that run a C++ program built by the user, as its repository describes."""
 LANES = 6
 """Frames of ``lanes.yaml``."""
 BOXES = {
@@ -105,7 +105,7 @@ def clone(folder: Path, url: str, commit: str, part: str) -> None:
 
 
 def make_data(data: Path) -> None:
-    """Lanes, tracks, flow, voxels and text, each in a folder of its own, in the split ``train``."""
+    """Lanes, tracks, flow, voxels and text, each in a separate folder, in the split ``train``."""
     import gen_data
 
     one_split = "splits={train: 1}"

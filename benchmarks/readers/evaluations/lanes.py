@@ -46,8 +46,8 @@ def by_openlane_2d(program: Path, data: Path, out: Path, moved: float) -> float:
 def by_openlane_3d(code: Path, data: Path, out: Path, moved: float) -> float:
     """F-score of OpenLane's lines in space: three quarters of the visible points within 1.5 m.
 
-    It judges 3 to 103 m in front of the vehicle. Its script asks for a version of OR-Tools that
-    spells names otherwise, for a removed name of NumPy, and reads an attribute that it never sets.
+    It judges 3 to 103 m in front of the vehicle. Its script requires a version of OR-Tools that
+    spells names otherwise and a removed name of NumPy, and reads an attribute that it never sets.
     """
 
     def seen_from_above(line: dict[str, Any]) -> dict[str, Any]:
@@ -129,7 +129,7 @@ class TreeOfGeometries:
         self.geometries, self.tree = geometries, STRtree(geometries)
 
     def query(self, geometry: Any) -> list[Any]:
-        """Geometries whose boxes meet that of ``geometry``."""
+        """Geometries whose boxes intersect the box of ``geometry``."""
         return [self.geometries[k] for k in self.tree.query(geometry)]
 
 
@@ -151,7 +151,7 @@ def write_openlane(
 ) -> Path:
     """Predictions for the front camera, and their list; ``ground`` has points below the camera.
 
-    Lines of which less than two points are visible are no truth of OpenLane's evaluation.
+    Lines with fewer than two visible points are not part of OpenLane's ground truth.
     """
     labels, names = data / "lanes/openlane/lane3d_1000", []
     for path in sorted(labels.glob("*/*_CAM_FRONT/*.json")):

@@ -57,7 +57,7 @@ def pixels(image: Image, box: Box) -> tuple[int, int, int, int]:
 def language_of(text: str) -> str:
     """Language of a line, by ``languages.yaml``: a code as in ``Writing``.
 
-    Letters alone and numbers have none; names take that of the words around them.
+    Letters alone and numbers have none; names take the language of the words around them.
     """
     if text.casefold() in _LANGUAGE:
         return _LANGUAGE[text.casefold()]

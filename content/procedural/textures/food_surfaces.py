@@ -23,12 +23,12 @@ class FoodSurface:
 
     Attributes:
         grounds: Colours, of which seeds take one in turn.
-        patch, share: Colour of patches and how much they cover.
+        patch, share: Colour of patches and the share they cover.
         cells: Patches along a side of the image.
         pores, pore_cells: Darkness and number along a side of holes in crumb.
         relief: Factor on the height.
         specks, speck: Number and colour of herbs, seeds, fat.
-        browned, brown: Share and colour of what the oven has browned.
+        browned, brown: Share and colour of the part that the oven has browned.
     """
 
     grounds: tuple[str, ...]

@@ -72,9 +72,9 @@ def picture(w: int, h: int, paper: Color, rng: VariantRng, manner: Manner | None
     Args:
         w: Width [px].
         h: Height [px].
-        paper: Colour of what it is printed on, which cartoons and lines leave free.
+        paper: Colour of the paper, which cartoons and lines leave free.
         rng: Draws everything.
-        manner: How it is made; None = drawn.
+        manner: Technique; None = drawn.
     """
     manner = rng.choose(MANNERS) if manner is None else manner
     subject = rng.choose(tuple(_SUBJECTS))

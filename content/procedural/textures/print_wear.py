@@ -37,13 +37,13 @@ Window = tuple[slice, slice]
 
 @dataclass(frozen=True)
 class Sheet:
-    """What a print is on.
+    """Carrier of a print.
 
     Attributes:
-        places: Where each face is in the image.
+        places: Position of each face in the image.
         size_m: Width and height of each face.
         core: Colour under the ink, sRGB in [0, 1].
-        exposed: How much its borders are rubbed: 1 = edges of a box, less where it lies flat.
+        exposed: Abrasion of its borders: 1 = edges of a box, less where it lies flat.
         scratched: Share of the core that shows in the deepest scratches.
         level: The face that lies upward, where dust settles and mugs stand; empty = none.
         tears: Whether it is a label, of which pieces come off.
@@ -119,7 +119,7 @@ def _borders(rows: int, columns: int, deep: int, wide: int) -> Iterator[Window]:
 
 
 def _rub_edges(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> tuple[UInt8, UInt8]:
-    """Shares of bare board along edges, most at corners, and of grime beside it."""
+    """Shares of bare board along edges, most at corners, and of grime next to it."""
     soil = traces.noise_bytes(COARSE, size_px, rng)
     rubbed, soiled = np.zeros(size_px, np.uint8), traces.ramp_bytes(soil, 0.4, 0.9, 0.05 * wear)
     if wear < _UNTOUCHED:
@@ -186,7 +186,7 @@ def _settle(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> list[F
         away = np.sqrt(x[None, :] ** 2 + y[:, None] ** 2) - rng.between(*_RING_M)
         share = 0.45 * np.clip(2.0 - np.abs(away) / 0.0011, 0.0, 1.0) * (noise / 255.0)
         films.append(Film(traces.to_bytes(share.astype(np.float32)), _COFFEE))
-    # Dust comes with standing about, not with use: it is wiped off things that are handled.
+    # Dust gathers on idle objects, not through use: handling wipes it off.
     amount = 0.4 * rng.between(0.0, 1.0) ** 3
     level = float(traces.dust_share(np.ones(1, np.float32), amount)[0])
     return [*films, Film(traces.ramp_bytes(noise, 0.15, 0.6, level), _DUST)]

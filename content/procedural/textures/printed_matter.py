@@ -1,7 +1,7 @@
 """Printed matter: labels, folding boxes and book covers with invented names.
 
-These belong to one object and follow its UVs. Drawn at the proportions of the object and then
-squeezed into the image, so that letters look right on the object.
+These belong to one object and follow its UVs. They are drawn at the proportions of the object and
+then squeezed into the image: letters have the right shape on the object.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def _estate_label(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
 
 
 def _plain_label(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
-    """As on cosmetics and medicine: a name, a line, what it is, small print."""
+    """Text of cosmetics and medicine: a name, a line, a description, small print."""
     paper = rng.choose(((250, 250, 248), (245, 243, 238), design.ground))
     ink = max(
         (design.ink, (40, 42, 46)), key=lambda c: abs(art.brightness(c) - art.brightness(paper))

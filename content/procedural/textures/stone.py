@@ -23,7 +23,7 @@ from gen_data.core.noise import (
 from gen_data.core.variant_rng import VariantRng, in_turn
 
 _UNJOINTED = 4
-"""The first seeds of concrete, of which small things are cast, have no joints."""
+"""The first seeds of concrete, used for small castings, have no joints."""
 
 
 def marble(rng: VariantRng) -> TextureData:
@@ -44,7 +44,7 @@ def marble(rng: VariantRng) -> TextureData:
 def terrazzo(rng: VariantRng) -> TextureData:
     """Stone chips of 3 to 16 mm in cement, ground flat; 0.6 m per repeat.
 
-    Sizes are those of chips No. 1 to 4 of the trade (NTMA; from memory).
+    Sizes of the trade's chips No. 1 to 4 (NTMA; from memory).
     """
     ground = draw_color(PALETTES["cements"], 0.04, rng)
     palette = [color(rng.choose(PALETTES["chips"])) for _ in range(rng.choose((2, 3, 4)))]
@@ -228,7 +228,7 @@ def _tiled(
     # Grout is paler than dark tiles and darker than white ones.
     grout = mix_colors(np.array(albedo), color("#a9a59c"), np.full(edge.shape, 0.6))
     grout *= np.float32(rng.choose((0.92, 0.92, 0.8)))
-    # Tiles lie a little out of the plane, so that each reflects another place.
+    # Tiles are tilted a little against the plane: each reflects another place.
     tilt = ((uniform((2, count), rng) - 0.5) * 0.02).astype(np.float32)[:, number]
     y, x = rows_and_columns()
     height = SIZE_PX * (

@@ -27,7 +27,7 @@ from gen_data.core.variant_rng import VariantRng
 def fabric(rng: VariantRng) -> TextureData:
     """Plain or twill weave, plain-coloured, striped or checked; 0.15 m per repeat.
 
-    Yarns of 1.2 mm, those of furnishing fabrics; clothes have finer ones.
+    Yarns of 1.2 mm, as in furnishing fabrics; clothes have finer ones.
     """
     yarns = rng.choose((96, 128, 128))
     twill = rng.chance(0.4)

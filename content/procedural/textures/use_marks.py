@@ -1,7 +1,7 @@
-"""Marks of use on plain things: tide lines in cups, cutlery marks, scratches, fingerprints.
+"""Marks of use on plain objects: tide lines in cups, cutlery marks, scratches, fingerprints.
 
-The image multiplies a material's own colour, so that one serves things of every colour. There are
-``STEPS`` of each kind, from new to well used, which all variants share. Measures and shares are
+The image multiplies a material's own colour: one image serves objects of every colour. There are
+``STEPS`` of each kind, from new to well used, shared by all variants. Dimensions and shares are
 assumed, within a half.
 """
 
@@ -19,7 +19,7 @@ from gen_data.core.noise import SIZE_PX
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
 STEPS = 12
-# Below this step things are as new.
+# Below this step objects are as new.
 _FIRST = 4
 # Length of a repeat [m]; 0 = the mesh's own coordinates.
 _SCALES_M = {"vessel": 0.0, "dish": 0.27, "metal": 0.13, "plastic": 0.16}
@@ -95,7 +95,7 @@ def _vessel(wear: float, size_px: Size, rng: VariantRng) -> Marks:
         line = np.clip(1.0 - np.abs(below) / np.float32(wide), 0.0, 1.0)
         film = np.clip(below * 30.0, 0.0, 1.0) * np.float32(0.3)
         stained = np.maximum(stained, (line + film) * rng.between(0.3, 1.0))
-    # What dries last gathers in the corner of the floor and in its middle.
+    # The last liquid dries in the corner of the floor and in its middle.
     floor = np.clip((v - np.float32(0.72)) * 4.0, 0.0, 1.0) * (0.25 + 0.5 * broken)
     share = wear * np.maximum(stained * (0.3 + 0.9 * broken), floor)
     stirred = traces.scratches(int(50 * wear), 60.0, size_px, rng, 0.4)
@@ -130,7 +130,7 @@ def _metal(wear: float, size_px: Size, rng: VariantRng) -> Marks:
 def _plastic(wear: float, size_px: Size, rng: VariantRng) -> Marks:
     """Grease where hands hold it, scuffs and fingerprints."""
     held = traces.noise_bytes(COARSE, size_px, rng)
-    # A film without edges: what has edges at this scale reads as marble.
+    # A film without edges: edges at this scale look like marble.
     soiled = traces.ramp_bytes(held, 0.2, 1.0, 0.16 * wear)
     specks = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), 0.8, 1.0, 0.15 * wear)
     fine = traces.scratches(int(6 + 90 * wear), 110.0, size_px, rng, 0.6)

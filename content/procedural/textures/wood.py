@@ -2,7 +2,7 @@
 
 Growth rings are cones about the pith. A face of a board cuts them in hyperbolas: the cathedrals of
 flat-sawn boards, whose pith is under the face, and the straight lines of quarter-sawn ones, whose
-pith is beside it (Hoadley, "Understanding wood", 2000). Rings of timber from temperate climates
+pith is at its side (Hoadley, "Understanding wood", 2000). Rings of timber from temperate climates
 are 1 to 5 mm wide.
 """
 
@@ -27,13 +27,13 @@ _MEAN_RING = 0.2
 
 @dataclass(frozen=True, slots=True)
 class _Laid:
-    """Which board is where.
+    """Layout of boards.
 
     Attributes:
-        number: Of the board, int64, [n, n] or a column [n, 1].
+        number: Number of the board, int64, [n, n] or a column [n, 1].
         count: Number of boards.
-        across_mm: Distance from the board's middle line, of the same shape.
-        along: Place along the board, [n, n] or a row [1, n]; its whole part does not count.
+        across_mm: Distance from the board's middle line, in the same shape.
+        along: Position along the board, [n, n] or a row [1, n]; its integer part is ignored.
         joint_px: Distance to the nearest joint.
         length_px: Length of a board.
     """
@@ -110,8 +110,8 @@ def _staggered(rng: VariantRng) -> _Laid:
 def _herringbone(ratio: int, periods: int) -> _Laid:
     """Blocks at 45 degrees, so many times as long as wide; the pattern's periods per image.
 
-    Squares (i, j) of a block's width, with ``k = i - j`` modulo twice the ratio: those of
-    ``k < ratio`` belong to a block along i, the others to one along j.
+    Squares (i, j) of a block's width, with ``k = i - j`` modulo twice the ratio: squares with ``k <
+    ratio`` belong to a block along i, the others to one along j.
     """
     cells = 2 * ratio * periods
     y, x = rows_and_columns()

@@ -13,7 +13,7 @@ from gen_data.content.procedural.textures.print_wear import (
 )
 from gen_data.core import asset_types, se3
 
-# Widths and heights of labels vary from bottle to bottle; these are those of most [m].
+# Widths and heights of labels vary between bottles; these are typical [m].
 _WRAP_M, _FRONT_M = (0.22, 0.085), (0.07, 0.08)
 
 

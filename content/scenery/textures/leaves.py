@@ -1,7 +1,6 @@
 """Foliage with holes between its leaves. All are near-white: the material's colour tints them.
 
-Each image has four tiles, each a spray or a clump of its own within its borders, so that cards may
-show one tile.
+Each image has four tiles, each a separate spray or clump within its borders: a card shows one tile.
 """
 
 import math
@@ -82,11 +81,11 @@ _OUTLINES: Mapping[str, Callable[[Array], Array]] = {
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """How the leaves of a texture look and stand.
+    """Shape and arrangement of the leaves of a texture.
 
     Attributes:
         outline: Shape of a blade: a key of ``_OUTLINES``.
-        length, width: Of a blade, as a share of a tile's side.
+        length, width: Size of a blade, as a share of a tile's side.
         count: Leaves per tile.
         blades: Blades per leaf.
         habit: ``palm``: blades fan out from one point; ``feather``: they stand on both sides of a
@@ -157,7 +156,7 @@ def _draw_tile(kind: Kind, rng: VariantRng) -> tuple[Float32, Float32]:
         draw_blade(albedo, cover, stalk, _strip)
     for share in np.arange(kind.count) / kind.count:
         foot, turn = _place(kind, float(share), rng)
-        # What is drawn last is nearest to the light.
+        # Leaves drawn last are nearest to the light.
         tone = 0.62 + 0.3 * float(share) + rng.between(-0.08, 0.08)
         size = rng.between(0.7, 1.1)
         blade = Blade(foot, turn, size * kind.length, size * kind.width, tone, rng.between(-1, 1))

@@ -81,7 +81,7 @@ def foliage(rng: VariantRng) -> asset_types.TextureData:
 
 
 def produce(rng: VariantRng) -> asset_types.TextureData:
-    """Round fruit or vegetables of one size beside each other in a heap; 0.56 m per repeat."""
+    """Round fruit or vegetables of one size side by side in a heap; 0.56 m per repeat."""
     across = (8, 10, 7, 12)[rng.seed % 4]
     points = noise.worley((across, across), rng, 0.45)
     # A ball's height over the gap; each fruit hides a part of its neighbours.

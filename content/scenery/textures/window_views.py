@@ -1,11 +1,11 @@
-"""What panes show: rooms with curtains, blinds, lamps and plants; offices; displays of shops.
+"""Views through panes: rooms with curtains, blinds, lamps and plants; offices; shop displays.
 
 A texture is an atlas of square cells, one per pane. By day a room is far darker than its window's
-surroundings: only what hangs or stands close to the pane gets light. The glass over it is the
-material's specular layer.
+surroundings: light reaches only objects close to the pane. The glass over it is the material's
+specular layer.
 
-Emission shows the same rooms with their lamps on: some panes are dark, and those that are lit
-differ in brightness and colour.
+Emission shows the same rooms with their lamps on: some panes are dark, and lit ones differ in
+brightness and colour.
 """
 
 from collections.abc import Callable

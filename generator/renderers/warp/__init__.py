@@ -1,1 +1,1 @@
-"""The renderer on NVIDIA Warp: one package per stage, kernels beside their host code."""
+"""The renderer on NVIDIA Warp: one package per stage, kernels next to their host code."""

@@ -80,7 +80,7 @@ def why_no_gpu() -> str:
 
 
 def prepare_device(name: str) -> None:
-    """Load what every image needs on the device ``auto``, ``cpu`` or ``cuda:N``."""
+    """Load the kernels of every image on the device ``auto``, ``cpu`` or ``cuda:N``."""
     alias = open_device(name).alias
     compile_kernels(alias)
     load_kernels(alias, EVERY_FRAME)
@@ -138,8 +138,8 @@ def compile_kernels(device: str) -> None:
     """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are missing.
 
     A bundle of the distribution that fits these kernels, this version of Warp and this platform has
-    those of every frame and all others, on the CPU and perhaps on some kinds of GPUs. Of several
-    processes that find the cache empty, one fills it and the others wait.
+    the kernels of every frame and all others, for the CPU and possibly for some kinds of GPUs. Of
+    several processes that find the cache empty, one fills it and the others wait.
 
     Warns:
         CacheWarning: compiled kernels were damaged; they are compiled again. Or kernels are
@@ -150,7 +150,7 @@ def compile_kernels(device: str) -> None:
     """
     stamp = f"gen-data-{_digest()}-{device[:4]}"
     folder = Path(wp.config.kernel_cache_dir)
-    # Set afterwards, in any case: Warp compiles there what is missing when it is first used.
+    # Set afterwards, in any case: Warp compiles missing kernels there at their first use.
     wp.config.kernel_cache_dir = str(
         kernel_cache.fill_cache(folder, stamp, lambda chosen: _fill(chosen, stamp, device))
     )
@@ -220,7 +220,7 @@ def compile_in_parallel(device: str, names: Sequence[str], folder: Path) -> bool
     Args:
         device: Warp's name of the device; or ``sm_N``, which compiles for GPUs of this kind without
             having one.
-        names: Of the modules, below this package.
+        names: Names of the modules, below this package.
         folder: Cache that takes the compiled modules.
     """
     queue, feed = os.pipe()

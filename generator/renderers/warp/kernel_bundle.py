@@ -29,10 +29,10 @@ def kernel_modules() -> tuple[str, ...]:
 
 
 def write_bundle(kinds: Sequence[str] = ()) -> Path | None:
-    """Compile all modules anew and make them the only bundle; None if one fails to compile.
+    """Compile all modules again and make them the only bundle; None if one fails to compile.
 
     Args:
-        kinds: Of GPUs, ``sm_N``, beyond the CPU.
+        kinds: Kinds of GPUs, ``sm_N``, in addition to the CPU.
     """
     with TemporaryDirectory() as cache:
         modules = kernel_modules()

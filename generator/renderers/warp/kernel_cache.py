@@ -1,14 +1,14 @@
-"""Warp's cache of compiled kernels, checked: Warp runs whatever machine code it finds there.
+"""Warp's cache of compiled kernels, checked: Warp runs any machine code that it finds there.
 
-A file of the digests of all compiled modules lies beside them. A module that differs from its
-digest, or that is cut off, is removed, and so compiled again by its next user.
+A file with the digests of all compiled modules lies next to them. A module that differs from its
+digest, or that is truncated, is removed; its next user compiles it again.
 
-A distribution may bring compiled modules (``kernel_bundle.py``). They go into the cache under
-the names that Warp gave them, which contain the hash of everything they were compiled from, and
-Warp finds or ignores them as it does its own.
+A distribution may bring compiled modules (``kernel_bundle.py``). They enter the cache under the
+names given by Warp, which contain the hash of all their inputs, and Warp finds or ignores them like
+its own.
 
-A cache that cannot be written, of an image or of another user, is used through a private folder
-that links its modules and takes those that are missing.
+A read-only cache, of an image or of another user, is used through a private folder that links its
+modules and receives missing ones.
 """
 
 import errno
@@ -44,7 +44,7 @@ def fill_cache(folder: Path, stamp: str, fill: Callable[[Path], None]) -> Path:
     Args:
         folder: The cache.
         stamp: Name of the file in it that marks it as filled.
-        fill: Adds what is missing to a folder.
+        fill: Adds missing modules to a folder.
 
     Returns:
         The folder to be used: ``folder``, or one that links its modules.
@@ -137,7 +137,7 @@ def link_modules(folder: Path) -> Path:
 
 
 def remove_damaged_modules(folder: Path) -> tuple[str, ...]:
-    """Remove damaged modules of a cache; record those that are new.
+    """Remove damaged modules of a cache; record new ones.
 
     One process at a time may call it.
 

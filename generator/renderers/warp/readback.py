@@ -26,7 +26,7 @@ class Readback:
 
     Attributes:
         parts: The arrays, not initialised; valid as long as ``memory`` is.
-        memory: What holds them, one after another.
+        memory: Buffer that contains them, one after another.
         dtypes: Their types.
     """
 

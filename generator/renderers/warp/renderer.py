@@ -156,7 +156,7 @@ class _LatestLabels:
         return images if scene is self._scene and camera is seen else {}
 
     def keep(self, scene: Scene, camera: Camera, reading: SensorReading) -> None:
-        """Keep the label images of a reading, and drop those of other scenes."""
+        """Keep the label images of a reading, and drop label images of other scenes."""
         if scene is not self._scene:
             self._scene, self._known = scene, {}
         images = {c: image for c, image in reading.channels.items() if c in _KEPT}

@@ -8,7 +8,7 @@ from gen_data.config.base_model import Strict
 
 
 class RenderSettings(Strict):
-    """Computation of radiance. Labels do not depend on it; cameras have settings of their own.
+    """Computation of radiance. Labels do not depend on it; cameras have separate settings.
 
     Attributes:
         tier: ``realtime`` is free of noise and takes a tenth of a second; ``pathtraced`` simulates
@@ -22,10 +22,10 @@ class RenderSettings(Strict):
         ambient_occlusion_radius_m: Distance up to which surfaces occlude ambient light; 0 disables
             ambient occlusion.
         environment_shadow: ``auto`` lets the brightest parts of a panorama cast shadows if the
-            scene is open to it and has no sun of its own; ``off`` treats all of it as light without
+            scene is open to it and has no separate sun; ``off`` treats all of it as light without
             shadows.
-        max_lamps: Maximum number of a scene's lights, those that contribute most to the visible
-            surfaces.
+        max_lamps: Maximum number of a scene's lights; the ones that contribute most to the visible
+            surfaces are kept.
         visibility: Method that finds the surface at a pixel centre: ``raster`` (CPU only),
             ``rays``, or the faster one on the device.
     """

@@ -1,7 +1,7 @@
 """Radiance and labels of images exposed at several instants, or over an interval.
 
-The camera's shutter defines the instants. Labels are those of each row's own instant, the middle of
-its exposure. Radiance is averaged over the exposure: time is divided into slices, each slice is
+The camera's shutter defines the instants. Labels refer to each row's own instant, the middle of its
+exposure. Radiance is averaged over the exposure: time is divided into slices, each slice is
 rendered at its middle for the rows exposed then, and each row is the weighted mean of its slices.
 Both use no more instants than the motion in the image requires.
 """

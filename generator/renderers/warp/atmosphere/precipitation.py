@@ -59,7 +59,7 @@ def rain(rate_mm_h: float) -> Kind:
 def snow(rate_mm_h: float) -> Kind:
     """Snowflakes; Sekhon and Srivastava: 2500 R^-0.94 per m^3 and mm, slope 2.29 R^-0.45 per mm.
 
-    Diameters are those of the melted drops.
+    Diameters refer to the melted drops.
     """
     slope_per_mm, least_mm = 2.29 * rate_mm_h**-0.45, 0.7
     density = 2500.0 * rate_mm_h**-0.94 / slope_per_mm * math.exp(-slope_per_mm * least_mm)
@@ -78,7 +78,7 @@ def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
     # Black pixels, outside a lens's field or without a background, are ignored.
     lit = levels[levels > 0.0]
     median_cd_m2 = float(np.median(lit)) if len(lit) else 0.0
-    # Rounded, so that the last bit of a logarithm has no effect.
+    # Rounded: the last bit of a logarithm must have no effect.
     # White is 1.2 * 2^EV100 cd/m^2 (ISO 12232); metering places the mean at middle grey.
     return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * colorimetry.MIDDLE_GREY)) * 16.0) / 16.0
 
@@ -187,7 +187,7 @@ def _streak_records(
     length = np.sqrt(((values["end_px"] - values["start_px"]) ** 2).sum(axis=1))
     sharp = px_per_rad * diameter_m / depth_m
     wide = np.maximum(sharp + px_per_rad * _APERTURE_M / depth_m, 1.0)
-    # Area of the particle's disk over that of its streak.
+    # Area of the particle's disk divided by the area of its streak.
     area = 0.25 * math.pi * sharp**2 / (wide * length + 0.25 * math.pi * wide**2)
     values["opacity"] = np.minimum(area, 1.0)
     values["radius_px"] = 0.5 * wide
@@ -199,8 +199,8 @@ def trace_through_lens(
 ) -> NDArray[np.void]:
     """As ``make_streaks``, for lenses with distortion: depths are ranges.
 
-    Particles are distributed over the narrowest cone that contains the image, and those in it are
-    kept.
+    Particles are distributed over the narrowest cone that contains the image, and the ones in the
+    image are kept.
     """
     k, T = camera.intrinsics, camera.T_world_camera
     least_cosine = _rim_cosine(k)

@@ -1,6 +1,6 @@
 """Reflectance of materials for lasers near 905 nm.
 
-Visible colour says little about the near infrared, so a material's role on its object takes
+Visible colour is a poor predictor of the near infrared: a material's role on its object takes
 precedence, and colour decides for all others. Sources and values are in ``infrared.yaml``.
 """
 

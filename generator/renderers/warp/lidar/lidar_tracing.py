@@ -190,8 +190,8 @@ def trace_secondary(
 ) -> SecondaryHits | None:
     """Secondary hits of all rays; None without any.
 
-    ``inputs`` are those of the kernel that found the first hits, ``infrared`` the Infrared records
-    of the materials.
+    ``inputs`` are the inputs of the kernel that found the first hits, ``infrared`` the Infrared
+    records of the materials.
     """
     order = beams.order
     material = first.hits[:, 1]
@@ -271,7 +271,7 @@ RUN, RUN_MIN, RUNS = 128, 8, 64
 make about ``RUNS`` runs of at least ``RUN_MIN``."""
 
 THREADS = 16
-"""Threads of a launch on the CPU, where they run one after another, each with lists of its own."""
+"""Threads of a launch on the CPU, where they run one after another, each with separate lists."""
 
 RUN_CUDA, THREADS_CUDA = 32, 16384
 

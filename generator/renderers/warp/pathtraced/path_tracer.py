@@ -74,7 +74,7 @@ def denoise(light: Float32, albedo: Float32, normal: Float32) -> Float32:
     return np.asarray(result * np.float32(1.0 / scale))
 
 
-# Launches are short, so that a device that also drives a screen stays responsive.
+# Launches are short: a device that also drives a screen stays responsive.
 _SAMPLES_AT_ONCE = 32
 _GUIDE_SAMPLES = 16
 _TABLE_BYTES = 16 << 20

@@ -20,7 +20,7 @@ from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.gbuffer import GBuffer
 
 _STRIDE_PX = 11
-# Assumed background illuminance, so that lamps are not ranked by their effect in the dark [lx].
+# Assumed background illuminance: lamps must not be ranked by their effect in the dark [lx].
 _DIM_LUX = 0.05
 # Minimum cosine: a lamp also matters for surfaces turned away from it, by its glow and reflections.
 _TURNED_AWAY = 0.1

@@ -43,7 +43,7 @@ _PARTS = 2
 _THIN_LAYERS = 3
 """Surfaces that no pixel centre nearby shows, in one pixel: both rims of a gap, and its ground."""
 _COVERAGE_SAMPLES = 8
-"""Samples per pixel on edges that determine what covers a photograph."""
+"""Samples per pixel on edges, which determine the coverage of a photograph."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -64,10 +64,10 @@ class Shading:
     """Shaded pixels, and the light in which more points of their surfaces can be shaded.
 
     Attributes:
-        frame: The view, with the lights that count.
-        radiance: Of all pixels [cd/m^2], linear RGB, flat; scratch memory.
-        lattice: Points at which light was found; None in the path-traced tier.
-        around: Light there.
+        frame: The view, with the selected lights.
+        radiance: Radiance of all pixels [cd/m^2], linear RGB, flat; scratch memory.
+        lattice: Points at which light was computed; None in the path-traced tier.
+        around: Light at these points.
     """
 
     frame: CameraView
@@ -93,7 +93,7 @@ def shade_pixels(frame: CameraView) -> Shading:
 
 
 def render_bare_ground(state: CameraState, context: RenderContext) -> wp.array:
-    """Radiance of the ground of a photograph without the things on it, flat."""
+    """Radiance of the ground of a photograph without the objects on it, flat."""
     bare = CameraState.of(plates.without_things(state.scene), state.camera)
     frame = render_view(bare, replace(context, backdrop=None))
     return _copy(shade_pixels(frame).radiance)
@@ -299,7 +299,7 @@ def _light_listed(
     cache, settings = frame.cache, frame.settings
     listed = lattice_lighting.ListedPixels()
     listed.pixels = pixels
-    # Powers of two, so that scratch memory seldom grows, plus a little: rows of lamps a power of
+    # Powers of two, for which scratch memory seldom grows, plus a little: rows of lamps a power of
     # two apart would collide in the processor's cache.
     room = (1 << number.bit_length()) + 48
     listed.lit = cache.scratch("listed lit", (around.lit.shape[0], room), float)
@@ -325,8 +325,8 @@ def _shade_layers(
     probe: lattice_lighting.Probe,
     radiance: wp.array,
 ) -> None:
-    """Shade those of ``number`` listed pixels that show layered surfaces, in place."""
-    # A module of its own: scenes without such surfaces neither compile nor load it.
+    """Shade the pixels that show layered surfaces among ``number`` listed ones, in place."""
+    # A separate module: scenes without such surfaces neither compile nor load it.
     from gen_data.renderers.warp.realtime.kernels import clearcoat_glass
 
     inputs = [*frame.inputs, listed, probe]
@@ -369,7 +369,7 @@ _BLOCK = int(soft_shadows.BLOCK)
 _LIST_LENGTH = int(shadow_culling.LIST_LENGTH)
 _ENOUGH_FOR_LAMPS, _ENOUGH_FOR_SKY = 8.0, 20.0
 """Points of a window of 25 below which a higher one is averaged: shadows keep their edges."""
-# Column of the sample in each row of a pixel, far from those of neighbouring rows (n-rooks).
+# Column of the sample in each row of a pixel, far from columns of neighbouring rows (n-rooks).
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
 
 

@@ -21,7 +21,7 @@ def lobe_albedo() -> Float32:
     half vectors of GGX, with the masking of
     ``gen_data.renderers.warp.scene.kernels.brdf``.
     """
-    # Roughness 0 and grazing view are limits without a value of their own.
+    # Roughness 0 and grazing view are limits without a defined value.
     nodes = np.clip(np.arange(_ENTRIES) / (_ENTRIES - 1.0), 1e-3, 1.0)
     roughness, n_v = nodes[:, None, None], nodes[None, :, None]
     strata = (np.arange(_STRATA) + 0.5) / _STRATA

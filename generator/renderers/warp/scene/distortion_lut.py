@@ -77,7 +77,7 @@ def _pixel_angles(rays: se3.Array, intrinsics: Intrinsics) -> se3.Array:
 
 
 def _slopes(rays: se3.Array, axis: int) -> se3.Array:
-    """Change per pixel along an axis; NaN beside pixels that are not shown."""
+    """Change per pixel along an axis; NaN next to pixels that are not shown."""
     if rays.shape[axis] == 1:
         return np.full_like(rays, np.nan)
     return np.asarray(np.gradient(rays, axis=axis))

@@ -2,8 +2,8 @@
 
 The brightest parts of a panorama are extracted as lamps at infinity. Environment light casts no
 shadows here, but a sun, a window or a softbox in a panorama should. Each such part becomes a disk
-in the sky with the part's vector irradiance, so that a surface with the whole part above its
-horizon receives exactly the same light, whatever the part's shape.
+in the sky with the part's vector irradiance: a surface with the whole part above its horizon
+receives exactly the same light, whatever the part's shape.
 
 Source of the idea: Debevec, "A median cut algorithm for light probe sampling", SIGGRAPH 2005
 posters; here only outstanding parts are extracted, and the rest remains an image.

@@ -101,7 +101,8 @@ class _PackedScene:
 
 
 _FILE_BYTES = 64 << 20
-"""Pages of files that frames may read until all are dropped: about what a street's views share."""
+"""Pages of files that frames may read until all are dropped: about as many as the views of a street
+share."""
 
 
 def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
@@ -116,7 +117,7 @@ def repack_moved(
 ) -> PackedWorld:
     """Pack another instant of a packed scene: the same assets and materials at other poses.
 
-    Poses of bodies, lights and camera may differ from those of ``world``.
+    Poses of bodies, lights and camera may differ from the poses in ``world``.
     """
     _, *assets = world.keep
     meshes = assets[0]
@@ -142,7 +143,7 @@ def _pack_for_camera(
     body_records = placement.body_records.copy()
     if len(body_records):
         _fill_camera_poses(body_records, placement, camera)
-    # A record of its own: weather and lamps are set for one view.
+    # A separate record: weather and lamps are set for one view.
     record = copy_struct(packed.record, records.World)
     record.bodies = to_device(body_records, records.BodyRecord, cache.device)
     return PackedWorld(
@@ -282,8 +283,7 @@ def _fill_poses(
 def _fill_camera_poses(values: NDArray[np.void], placement: _Placement, camera: Camera) -> None:
     """Fill in the bodies' poses relative to a camera.
 
-    Products are computed in float64, so that a camera far from the world's origin loses no
-    precision.
+    Products are computed in float64: a camera far from the world's origin loses no precision.
     """
     R_camera_world = camera.T_world_camera.rotation().T
     away = placement.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)

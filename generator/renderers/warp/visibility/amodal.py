@@ -1,8 +1,8 @@
 """Amodal silhouettes: each instance alone, on a canvas three images wide and high.
 
-Silhouettes of a pinhole are rasterised, those of other lenses found by rays. There the canvas
-extends the lens model: its pixels outside the image look where a larger sensor behind the same lens
-would, and nowhere beyond the lens's field.
+Silhouettes of a pinhole camera are rasterised; with other lenses, they are found by rays. The
+canvas then extends the lens model: its pixels outside the image have the directions of a larger
+sensor behind the same lens, and none beyond the lens's field.
 """
 
 import math
@@ -41,9 +41,9 @@ _EDGES = np.array([(k, k | bit) for bit in (1, 2, 4) for k in range(8) if not k 
 def render_silhouettes(frame: CameraView, seen_ids: NDArray[np.uint16]) -> dict[int, Silhouette]:
     """The silhouette of every annotated instance, by instance id.
 
-    Coverage is the rasteriser's for a pinhole, else that of rays. It is united with ``seen_ids``,
-    the image of visible instance ids: where rays decide visibility, they may differ from the
-    rasteriser by a pixel at an edge.
+    Coverage is the rasteriser's for a pinhole, otherwise the one found by rays. It is united with
+    ``seen_ids``, the image of visible instance ids: where rays decide visibility, they may differ
+    from the rasteriser by a pixel at an edge.
     """
     pinhole = frame.view.lens == records.PINHOLE
     boxes, drawn = _rasterize_masks(frame) if pinhole else _trace_masks(frame)

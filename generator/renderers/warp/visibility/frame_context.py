@@ -24,8 +24,8 @@ class Backdrop:
     Attributes:
         photo: Radiance [cd/m^2], linear RGB, float32 [h, w, 3].
         mask: Share of each pixel that the foreground covers, float32 [h, w]; None = no foreground.
-        ground: Pixels that show ground on which things may stand, bool [h, w].
-        unshaded: Radiance of the ground without anything on it, flat, on the device; None until it
+        ground: Pixels that show ground on which objects may stand, bool [h, w].
+        unshaded: Radiance of the ground without objects on it, flat, on the device; None until it
             is rendered.
     """
 
@@ -145,7 +145,7 @@ def render_view(
     rows: tuple[int, int] | None = None,
     reference: CameraView | None = None,
 ) -> CameraView:
-    """Find the surfaces at all pixel centres, or at those of some rows (the end is exclusive).
+    """Find the surfaces at all pixel centres, or in some rows (the end is exclusive).
 
     ``reference`` is the same world at another instant, whose assets need not be packed again.
     """

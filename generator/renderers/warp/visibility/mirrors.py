@@ -44,7 +44,7 @@ def trace_mirrors(
 def mirror_images(
     channels: frozenset[Channel], parts: Sequence[layers.SparseLabels], height: int, width: int
 ) -> dict[Channel, NDArray[Any]]:
-    """Requested images of what mirrors show; ``parts`` are labels of the image's pixels."""
+    """Requested images of reflections in mirrors; ``parts`` are labels of the image's pixels."""
     images = {}
     for channel in channels & MIRRORED.keys():
         nothing = np.asarray(MIRRORED[channel])

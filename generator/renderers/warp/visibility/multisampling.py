@@ -1,4 +1,4 @@
-"""Samples of pixels on edges: what the rasteriser sees there."""
+"""Samples of pixels on edges, found by the rasteriser."""
 
 import numpy as np
 import warp as wp
@@ -21,8 +21,8 @@ def draw_samples(
         frame: The image.
         projected: Its rasterised vertices.
         pixels: Flat numbers of the pixels.
-        positions: Of the samples in a pixel, [0, 1), [2, 4 or 8, 2]. Two are drawn twice: the
-            rasteriser takes multiples of four.
+        positions: Positions of the samples in a pixel, [0, 1), [2, 4 or 8, 2]. Two are drawn twice:
+            the rasteriser takes multiples of four.
     """
     cache, view, world = frame.cache, frame.view, frame.world
     numbers = cache.scratch("numbers", frame.pixels, wp.int32)

@@ -1,11 +1,11 @@
-"""Photographs behind rendered things: differential rendering on a photograph's ground.
+"""Photographs behind rendered objects: differential rendering on a photograph's ground.
 
-The ground is rendered with and without the things on it. Its pixels show the photograph times the
-ratio of both, so that shadows, reflections and the light of lamps fall on the photograph; where no
-surface is hit, the photograph is shown as it is. The foreground that a mask marks covers both.
+The ground is rendered with and without the objects on it. Its pixels show the photograph times the
+ratio of both: shadows, reflections and the light of lamps fall on the photograph; where no surface
+is hit, the photograph is unchanged. The foreground marked by a mask covers both.
 
 Source: Debevec, "Rendering synthetic objects into real scenes", SIGGRAPH 1998; with a ratio in
-place of his difference, so that the texture of the ground is kept in shadows.
+place of his difference, which keeps the texture of the ground in shadows.
 """
 
 from dataclasses import replace
@@ -26,7 +26,7 @@ from gen_data.renderers.warp.visibility.kernels import photographs as kernels
 _RATIO_MAX = 16.0
 """Headlights on dark ground multiply its light; more is an error of a nearly black ratio."""
 _DARKEST_CD_M2 = np.float32(1e-6 * plates.WHITE_CD_M2)
-"""Radiance without things below which the ground has no ratio."""
+"""Radiance without objects below which the ground has no ratio."""
 _FIREFLY = np.float32(1.3)
 """Largest ratio of a path-traced pixel over the median around it."""
 _SAME_PLACE = 1e-5
@@ -92,11 +92,11 @@ def mix_photo(frame: CameraView, backdrop: Backdrop, coverage: Float32, radiance
     """Replace background and ground in radiance averaged over pixels, in place.
 
     Args:
-        frame: As of ``show_photo``.
+        frame: As in ``show_photo``.
         backdrop: The photograph.
-        coverage: Share of each pixel that things cover, [h, w].
-        radiance: Mean radiance; pixels on edges mix things and ground. The light of the ground
-            in them is that around them.
+        coverage: Share of each pixel that objects cover, [h, w].
+        radiance: Mean radiance; pixels on edges mix objects and ground, with the light of the
+            ground around them.
     """
     rows, image, is_ground, is_empty = _split(frame, radiance)
     photo, unshaded = backdrop.photo[rows], _unshaded(backdrop)[rows]
@@ -108,7 +108,7 @@ def mix_photo(frame: CameraView, backdrop: Backdrop, coverage: Float32, radiance
     count = cv2.boxFilter(known, -1, (5, 5), normalize=False)[..., None]
     around = np.where(count > 0.0, sums / np.maximum(count, 1.0), np.float32(1.0))
     share = np.where(clear, 0.0, 1.0 - coverage)[..., None]
-    # What the synthetic background added to the pixel gives way to the photograph.
+    # The photograph replaces the synthetic background's contribution to the pixel.
     mixed = np.maximum(image - share * unshaded * around, 0.0) + share * photo * around
     shown = np.where(clear[..., None], photo * behind_ratio, mixed)
     radiance.assign(shown.astype(np.float32).reshape(-1, 3))
@@ -117,8 +117,8 @@ def mix_photo(frame: CameraView, backdrop: Backdrop, coverage: Float32, radiance
 def restore_photo(frame: CameraView, centres: wp.array, radiance: wp.array) -> None:
     """Undo the anti-aliasing of the photograph itself, in place.
 
-    The edge between its ground and its background is no edge in the photograph. ``centres`` is the
-    radiance before, flat.
+    The edge between its ground and its background is not an edge in the photograph. ``centres`` is
+    the radiance before, flat.
     """
     width, height = int(frame.view.width), int(frame.view.height)
     inputs = [frame.gbuffer.hits, _kinds(frame), width, height, centres]
@@ -165,7 +165,7 @@ def is_hidden(
 
 
 def _kinds(frame: CameraView) -> wp.array:
-    """What the body of each number is to the photograph, beginning with none."""
+    """Kind of each body with respect to the photograph, by number; the first means no body."""
     bodies = frame.state.scene.bodies
     kinds = [kernels.GROUND if plates.is_catcher(body) else kernels.THING for body in bodies]
     values = np.array([kernels.EMPTY, *kinds], np.int32)
@@ -216,7 +216,7 @@ def _unshaded(backdrop: Backdrop) -> Float32:
 
 
 def _ratio(image: Float32, unshaded: Float32) -> Float32:
-    """Light on the ground over its light without things, by channel, [h, w, 3]."""
+    """Light on the ground divided by its light without objects, by channel, [h, w, 3]."""
     ratio = image / np.maximum(unshaded, _DARKEST_CD_M2)
     ratio = np.where(unshaded > _DARKEST_CD_M2, ratio, np.float32(1.0))
     return np.asarray(np.minimum(ratio, np.float32(_RATIO_MAX)))

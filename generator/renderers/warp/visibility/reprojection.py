@@ -163,7 +163,7 @@ def render_bands(
 
 
 def add_margin(band: RowBand, height_px: int) -> tuple[int, int]:
-    """Rows to render so that light in a band equals that of the whole image."""
+    """Rows to render for light in a band that equals the light in the whole image."""
     first = max(band.first - _MARGIN_PX, 0) // _PATTERN_PX * _PATTERN_PX
     end = -(-(band.end + _MARGIN_PX) // _STRIDE_PX) * _STRIDE_PX + 1
     return first, min(end, height_px)

@@ -17,8 +17,8 @@ SNOW_GREEN = wp.constant(0.83)
 SNOW_BLUE = wp.constant(0.87)
 # Share of the rain on level ground that walls receive.
 WALL_SHARE = wp.constant(0.4)
-# Size of puddles; of the noise that gathers them in regions, relative to theirs; what drains a
-# place, in units of the noise (standard deviation 0.56): per metre above the gutter, and on soil.
+# Size of puddles; relative size of the noise that groups them in regions; drainage, in units of the
+# noise (standard deviation 0.56): per metre above the gutter, and on soil.
 # Assumed: of the puddles of gutters, crowns of roads (0.06 m) have a third, soil an eighth.
 PUDDLE_M = wp.constant(5.0)
 REGION_SHARE = wp.constant(0.5)
@@ -67,7 +67,7 @@ def fractal_noise(x_m: float, y_m: float, size_m: float, seed: int):
     """Noise of four octaves with mean 0 and standard deviation 0.513."""
     x = x_m / size_m
     y = y_m / size_m
-    # Octaves are rotated, so that their grids do not line up.
+    # Octaves are rotated: their grids must not line up.
     total = value_noise(x, y, seed)
     total += 0.55 * value_noise(1.7 * x + 1.2 * y, 1.7 * y - 1.2 * x, seed + 1)
     total += 0.3 * value_noise(4.1 * x - 1.3 * y, 4.1 * y + 1.3 * x, seed + 2)
@@ -99,10 +99,10 @@ def edge_width(footprint_m: float, size_m: float):
 
 @wp.func
 def wet_places(world: World, surface: int, p: wp.vec3):
-    """How readily water stands at a point, normal noise less what drains: 0 on a level pavement.
+    """Tendency of water to stand at a point, normal noise minus drainage: 0 on a level pavement.
 
     Water runs from the crowns of roads and from pavements to gutters, the lowest places of streets,
-    which lie at z = 0; on hills and decks the rule fades. Soil and turf let it seep away.
+    which lie at z = 0; on hills and decks the rule fades out. Soil and turf let it seep away.
     """
     level = fractal_noise(p[0], p[1], PUDDLE_M, world.ground.seed)
     # Some regions of the ground hold more water than others.
@@ -154,7 +154,7 @@ class Coat:
     Attributes:
         wet, puddle, snow: Shares of the point that are wet, under water and under snow.
         mixable: Values that interpolate linearly, for albedo_below_coat and bump_visibility: factor
-            of wetness on albedo, visibility of the surface's own bumps beside snow, snow_rise, and
+            of wetness on albedo, visibility of the surface's own bumps next to snow, snow_rise, and
             brightness of full snow.
     """
 

@@ -33,7 +33,7 @@ class Streak:
 
 @wp.kernel
 def light_streaks(view: View, world: World, streaks: wp.array[Streak]):
-    """Radiance of particles towards the camera: ambient light, and that of lamps."""
+    """Radiance of particles towards the camera: ambient light and light of lamps."""
     k = wp.tid()
     p = streaks[k].p_m
     d = fast_normalize(p - view.eye_m)

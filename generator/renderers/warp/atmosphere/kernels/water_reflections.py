@@ -308,8 +308,7 @@ def around_pixel(
     for k in range(4):
         q, w = cell_corner(lattice, cell, k)
         if lattice.body[q] >= 0 and wp.abs(images.z_m[lattice.pixel[q]] - z) < 0.1 * z:
-            # A trace of every neighbour, so that a pixel on an unusable lattice point has a
-            # fallback.
+            # A trace of every neighbour: a pixel on an unusable lattice point needs a fallback.
             w += 1.0e-4
             around.exposed += world.ground.exposed[q] * w
             if lattice.surface[q] == surface:

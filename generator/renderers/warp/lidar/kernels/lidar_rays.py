@@ -136,12 +136,12 @@ def beam_direction(axis: wp.vec3, k: int, spread: float):
 def backscatter(light: Infrared, cosine: float):
     """Reflectance towards the source, including the cosine of incidence.
 
-    The diffuse term is Lambert's, ``even * cosine``, or that of a rough surface, whose facets face
-    the scanner at any angle (Oren and Nayar, "Generalization of Lambert's reflectance model", 1994,
-    for coincident source and viewer). The lobe is GGX with its half vector along the ray, relative
-    to a white Lambertian surface: ``pi * D * F * G / (4 cosine^2) * cosine`` with Smith's G, equal
-    both ways (Walter et al., "Microfacet models for refraction", 2007). A retro-reflector works up
-    to entrance angles of about 60 degrees (ASTM D4956).
+    The diffuse term is Lambert's, ``even * cosine``, or the term of a rough surface, whose facets
+    face the scanner at any angle (Oren and Nayar, "Generalization of Lambert's reflectance model",
+    1994, for coincident source and viewer). The lobe is GGX with its half vector along the ray,
+    relative to a white Lambertian surface: ``pi * D * F * G / (4 cosine^2) * cosine`` with Smith's
+    G, equal both ways (Walter et al., "Microfacet models for refraction", 2007). A retro-reflector
+    works up to entrance angles of about 60 degrees (ASTM D4956).
     """
     # The lobe divides by the cosine; within 0.06 degrees of grazing nothing returns.
     c = wp.max(cosine, 1.0e-3)
@@ -156,10 +156,10 @@ def backscatter(light: Infrared, cosine: float):
 
 @wp.func
 def echo_share(scan: Scan, light: Infrared, range_m: float):
-    """Share of a ray's light that returns as one echo, by the width of what the ray stands for.
+    """Share of a ray's light that returns as one echo, by the width of the beam part it represents.
 
-    A beam narrower than a leaf meets a leaf or a gap. A wider one meets leaves at several depths
-    and gaps between them, so that its echo is fainter: scanners lose trees before walls of the same
+    A beam narrower than a leaf hits a leaf or a gap. A wider one hits leaves at several depths
+    and gaps between them, and its echo is fainter: scanners lose trees before walls of the same
     reflectance.
     """
     share = float(1.0)
@@ -471,7 +471,7 @@ def trace_behind_panes(
             hits[j] = wp.vec2i(-1, -1)
             ray = make_ray(scan, motion, axes, selected[j])
             begin_m = ray.origin_m
-            # Start just before the pane, so that its own face is found first.
+            # Start just before the pane: its own face must be found first.
             way_m = wp.max(first_m[selected[j]] - ray_queries.LASER_OFFSET_M, 0.0)
             passed = float(1.0)
             for face in range(FACES_MAX):
@@ -487,7 +487,8 @@ def trace_behind_panes(
                         material = records.surface_index(world, wp.vec2i(hit.body, hit.face))
                         clear = lights[material].clear
                         if face > 0:
-                            # A pane's echo is overwritten by that of the surface behind it, if any.
+                            # A pane's echo is overwritten by the echo of the surface behind it, if
+                            # any.
                             hits[j] = wp.vec2i(hit.body, material)
                             ranges_m[j] = way_m - ray_queries.LASER_OFFSET_M
                             reflected = backscatter(lights[material], cosine)

@@ -1,13 +1,13 @@
 """BSDFs of the path tracer: evaluation and sampling.
 
-All directions are in the shading frame, whose Z axis is the normal; ``v`` points to where the path
-comes from, ``l`` to where it continues. The model is that of ``brdf`` with Smith's exact
+All directions are in the shading frame, whose Z axis is the normal; ``v`` points to the previous
+vertex of the path, ``l`` to the next. The model is the one of ``brdf`` with Smith's exact
 height-correlated masking instead of its approximation, and a coat above it. Thin sheets also
-transmit diffusely: their face, not their smooth normal, tells both sides apart, and either side
+transmit diffusely: their face, not their smooth normal, separates both sides, and either side
 counts by the absolute cosine of the smooth normal, whose mean over one side is the same for all
 normals.
 
-Sources: those of ``brdf``; Heitz, "Sampling the GGX distribution of visible normals", JCGT 7(4),
+Sources: see ``brdf``; Heitz, "Sampling the GGX distribution of visible normals", JCGT 7(4),
 2018; Dupuy and Benyoub, "Sampling visible GGX normals with spherical caps", HPG 2023 (the same
 distribution with fewer operations); Heitz, "Understanding the masking-shadowing function in
 microfacet-based BRDFs", JCGT 3(2), 2014; Walter et al. 2007 (refraction).
@@ -30,9 +30,9 @@ class Bsdf:
     """Reflection at a vertex, for one direction ``v``.
 
     Attributes:
-        v: Direction to where the path comes from; Z > 0.
-        diffuse: Albedo of the diffuse layer, attenuated by those above it.
-        passed: Albedo of diffuse transmission, attenuated likewise.
+        v: Direction to the previous vertex of the path; Z > 0.
+        diffuse: Albedo of the diffuse layer, attenuated by the layers above it.
+        passed: Albedo of diffuse transmission, attenuated by the same layers.
         flat: Normal of the face on the side of ``v``, for sheets; else 0.
         f0, f90: Reflectance of the specular layer (Schlick); ``scale`` contains the coat's
             attenuation and multiple scattering.
@@ -143,7 +143,7 @@ def make_bsdf(
         above = brdf.directional_albedo(table, wp.sqrt(s.coat_alpha), n_v)
         s.coat = coat * (1.0 + coat_f0 * (1.0 / (above[0] + above[1]) - 1.0))
         coated = s.coat * (coat_f0 * above[0] + above[1])
-        # What the coat reflects is missing below it.
+        # Light reflected by the coat does not reach the layers below.
         s.scale = s.scale * (1.0 - coated)
         s.diffuse = s.diffuse * (1.0 - coated)
         shine = shine * (1.0 - coated)

@@ -319,7 +319,7 @@ def draw_sky(sky: EnvironmentRecord, table: SkyTable, u: wp.vec2):
     column = find_interval(edges, width, u[0])
     tall = table.rows[row + 1] - table.rows[row]
     wide = edges[column + 1] - edges[column]
-    # Uniform within the texel, by what is left of the number.
+    # Uniform within the texel, by the remainder of the number.
     x = (float(column) + wp.min((u[0] - edges[column]) / wide, 1.0)) / float(width)
     y = (float(row) + wp.min((u[1] - table.rows[row]) / tall, 1.0)) / float(height)
     azimuth = wp.pi * (1.0 - 2.0 * x)

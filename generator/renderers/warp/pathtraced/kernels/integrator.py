@@ -4,9 +4,9 @@ Source: Kajiya, "The rendering equation", SIGGRAPH 1986, with next-event estimat
 importance sampling and Russian roulette as in Pharr, Jakob and Humphreys, "Physically Based
 Rendering", 4th ed., chapters 13 and 14.
 
-Every vertex samples one light source and continues in one direction. Mixed materials, such as glass
-and paint, are chosen between at random, so that a vertex has a single BSDF. Clear panes and opacity
-refract nothing: paths and shadow rays pass straight through them.
+Every vertex samples one light source and continues in one direction. One component of a mixed
+material, such as glass and paint, is chosen at random: a vertex has a single BSDF. Clear panes and
+opacity refract nothing: paths and shadow rays pass straight through them.
 """
 
 import warp as wp
@@ -70,7 +70,7 @@ class Budget:
         sample_bits: Bits that number all samples.
         bounces: Maximum number of scattering events.
         key: Key of the image's noise.
-        clear: 1 if some surface transmits light straight, so that shadow rays have to accumulate
+        clear: 1 if some surface transmits light straight and shadow rays have to accumulate
             transmittance.
         lights: Bits of techniques: 1 samples light sources, 2 hits them by BSDF sampling; 3 for
             images, the others to validate one against the other.
@@ -420,7 +420,7 @@ def choose_glass_lobe(world: World, v: Vertex, w: wp.vec3, xi: float):
         out.bsdf.f90 = 1.0
         # Divided by the probability of the choice: the estimate stays unbiased.
         out.weight = on * (1.0 / (1.0 - p))
-        # Multiple scattering returns what rough facets mask.
+        # Multiple scattering returns the light that rough facets mask.
         part = brdf.directional_albedo(world.lobes, wp.sqrt(alpha), w[2])
         # At F0 1 single scattering would lose energy: it is restored.
         boost = 1.0 / (part[0] + part[1])

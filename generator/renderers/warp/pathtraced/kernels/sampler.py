@@ -1,10 +1,10 @@
 """Samples of paths: scrambled Sobol points, a function of pixel, sample and dimension.
 
 The sampler has no state, so images do not depend on the order of pixels. All paths of an image
-share one sequence along a Morton curve through the pixels: the samples of a pixel, and those of
-neighbouring pixels together, are well distributed, so that noise is of high frequency and averages
-out for the eye. Pairs of dimensions are padded: each is a (0, 2)-sequence of its own, shuffled
-against the others.
+share one sequence along a Morton curve through the pixels: the samples of a pixel, and of
+neighbouring pixels together, are well distributed: noise has a high frequency and averages out for
+the eye. Pairs of dimensions are padded: each is a separate (0, 2)-sequence, shuffled against the
+others.
 
 Sources: Sobol, "On the distribution of points in a cube", 1967 (the second dimension's matrix is
 Pascal's triangle modulo 2); Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", 1995;
@@ -101,9 +101,9 @@ def random_pair(key: wp.uint32, dimension: int, sample: wp.uint32):
             (0, m, 2)-net.
     """
     seed = hash_bits(key ^ (wp.uint32(dimension) * wp.uint32(0x5851F42D)))
-    # Shuffle the sequence: each pair of one path traverses it in an order of its own.
+    # Shuffle the sequence: each pair of one path traverses it in a different order.
     index = reverse_bits(scramble(reverse_bits(sample), seed))
-    # Arbitrary odd constants: they need only differ, so that both streams are independent.
+    # Arbitrary odd constants: both streams are independent as long as they differ.
     first = scramble(index, hash_bits(seed ^ wp.uint32(0x2511E9B3)))
     second = scramble(second_dimension(index), hash_bits(seed ^ wp.uint32(0x63D83595)))
     return wp.vec2(unit_float(reverse_bits(first)), unit_float(reverse_bits(second)))

@@ -5,7 +5,7 @@ auto weight_at = [](float dx, float dy) {
     return 1.0f / (0.05f + squared * squared);
 };
 // Points on the same body, near the pixel and similarly oriented: within 37 degrees, neighbours
-// on round surfaces pass, those across an edge of a box do not. Visibility varies less than
+// on round surfaces pass, pairs across an edge of a box do not. Visibility varies less than
 // appearance: they need not share the pixel's material.
 auto is_usable = [&](int q) {
     return lattice.body.data[q] == body && wp::dot(n, lattice.normal.data[q]) > 0.8f

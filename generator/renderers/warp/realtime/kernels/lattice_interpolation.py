@@ -26,8 +26,8 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll":
 
 # Light of two points may be blended if their normals differ by less than eight degrees.
 SMOOTH_COSINE = wp.constant(0.99)
-# Least continued light, as a share of the nearest point's. It may fall towards a corner but never
-# rises: the edge of a shadow beside a rim must not shine.
+# Least extrapolated light, as a share of the nearest point's. It may fall towards a corner but not
+# rise: the edge of a shadow next to a rim must not shine.
 CONTINUED_MIN = wp.constant(0.4)
 
 
@@ -97,7 +97,7 @@ class Stretch:
 def point_beyond(lattice: Lattice, stretch: Stretch, first: int, k: int):
     """The lattice point behind the agreeing neighbour of a cell's corner off the surface; or -1.
 
-    The neighbour below or above comes first, else that beside the corner.
+    The neighbour below or above comes first, then the one to the side of the corner.
     """
     corners = stretch.agrees | stretch.turns
     x = first % lattice.width + (k & 1)
@@ -210,13 +210,13 @@ def shade_stretch(
     """Shade the pixels of a stretch.
 
     Args:
-        covered: Whether ``coats`` count, as of GroundRecord; ``white`` is the albedo of snow.
+        covered: Whether ``coats`` count, see GroundRecord; ``white`` is the albedo of snow.
         stride, x0, y0: Size of the cell and its first pixel.
         step_x, step_y: Size of a pixel in units of its cell.
 
     Returns:
-        Bits of the stretch's pixels in the cell, and 2^16 times those that cannot be interpolated,
-        because the surface turns too sharply or no lattice point lies on it.
+        Bits of the stretch's pixels in the cell, and 2^16 times the bits of pixels that cannot be
+        interpolated, because the surface turns too sharply or no lattice point lies on it.
     """
     ...
 

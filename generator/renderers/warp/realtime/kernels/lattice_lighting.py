@@ -163,9 +163,9 @@ def sum_lamp_light(
 def lit_normal(n: wp.vec3, side: wp.vec3, to_lamp: wp.vec3):
     """The normal whose cosine counts for a lamp; arguments as for light_at.
 
-    Of a translucent surface ``side`` tells reflection from transmission, and either counts by the
-    absolute cosine of the smooth normal. Its mean over the directions of one side is the same for
-    every smooth normal: no energy is gained or lost.
+    On a translucent surface ``side`` separates reflection from transmission, and either counts by
+    the absolute cosine of the smooth normal. Its mean over the directions of one side is the same
+    for every smooth normal: no energy is gained or lost.
     """
     facing = n
     if wp.dot(side, side) > 0.0 and wp.dot(n, to_lamp) < 0.0:
@@ -219,7 +219,7 @@ def light_at(
     received = lux + ambient
     mirrored = specular_occlusion(brdf, open_sky)
     if wp.dot(side, side) > 0.0:
-        # What hides the sky from a leaf hides it from its reflections, at any angle.
+        # Occluders of the sky also occlude a leaf's reflections, at any angle.
         mirrored = wp.min(mirrored, open_sky)
         behind = lamps.behind * (1.0 / wp.pi) + ambient_light.received_ambience(
             world, p_world, -n, open_sky
@@ -247,7 +247,7 @@ def light_lattice(
     """Light at the lattice's points on surfaces that are interpolated; bumps are left out.
 
     Args:
-        coats: Field ``mixable`` of a Coat: what weather leaves there; written if the ground is
+        coats: Field ``mixable`` of a Coat: wetness and snow there; written if the ground is
             covered.
     """
     k = wp.tid()
@@ -345,7 +345,8 @@ def interpolate_visibility(
     """Visibility at listed pixel k from the lattice's points around it; whether there are any.
 
     Args:
-        lit, open_sky, exposed: Of the lattice's points; ``exposed`` if the ground is covered.
+        lit, open_sky, exposed: Values of the lattice's points; ``exposed`` if the ground is
+            covered.
         body, p, n: Body, point and normal of the pixel.
         tolerance_m: Largest distance of points from its tangent plane.
         column, row, right, down: Its cell and its position there.

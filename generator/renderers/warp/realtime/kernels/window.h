@@ -8,7 +8,7 @@ auto is_inside = [&](int x, int y) {
 auto are_inside = [&](int x, int y) {
     return is_inside(x, y) && x + LANES <= lattice.width;
 };
-// Neighbours in a row; those off the lattice lie on no surface.
+// Neighbours in a row; points off the lattice lie on no surface.
 struct Points { Ints surface; Floats p[3], n[3]; };
 auto points_at = [&](int x, int y) {
     const int first = y * lattice.width + x;

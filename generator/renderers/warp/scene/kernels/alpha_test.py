@@ -194,7 +194,7 @@ def closest_solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float
     Args:
         o, d: The ray in the mesh frame.
         reach: Largest parameter along it.
-        through: What the ray may pass: HOLES, CLEAR or both.
+        through: Surfaces that the ray may pass: HOLES, CLEAR or both.
     """
     g = world.bodies[b].geometry
     strike = Strike()

@@ -1,4 +1,4 @@
-"""Ambient light at a point: that of a volume around it, else that of the sky.
+"""Ambient light at a point: from a volume around it, otherwise from the sky.
 
 Source: McTaggart, "Half-Life 2 / Valve Source shading", GDC 2004 (ambient cubes).
 """
@@ -100,9 +100,9 @@ def ambient_irradiance(world: records.World, p: wp.vec3, n: wp.vec3):
 
 @wp.func
 def interreflected_share(open_share: float):
-    """Share of a room's light that reaches a point beside surfaces that hide part of the room.
+    """Share of a room's light that reaches a point near surfaces that occlude part of the room.
 
-    What hides the room reflects its light: a white corner is not half as bright as the wall.
+    Occluders reflect the room's light: a white corner is not half as bright as the wall.
 
     Source: Jimenez et al., "Practical real-time strategies for accurate indirect occlusion",
     SIGGRAPH 2016 course; its polynomial for an albedo of 0.6, a mean of light walls and furniture.
@@ -123,7 +123,7 @@ def received_ambience(world: records.World, p: wp.vec3, n: wp.vec3, open_share: 
 @wp.func
 def ambient_reflection(world: records.World, p: wp.vec3, d: wp.vec3, roughness: float):
     """Radiance averaged over the lobe of a roughness around a mirrored direction."""
-    # Walls are near and even: what a hemisphere of them sends stands for any lobe.
+    # Walls are near and even: the light of a hemisphere of them approximates any lobe.
     light, weight = light_of_volumes(world, p, d)
     if weight == 0.0:
         light = environment_lighting.sky_reflection(world.sky, d, roughness)

@@ -9,8 +9,8 @@ without square roots); Burley, "Physically based shading at Disney", 2012 (param
 shading in Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "Practical multiple
 scattering compensation for microfacet models", 2019; Lagarde and de Rousiers, "Moving Frostbite to
 PBR", 2014 (F90); Born and Wolf, "Principles of Optics", 1.5.2 (Fresnel's formulae); Snell's law as
-in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th ed., 9.3. Weights of luminance are
-those of ``gen_data.core.colorimetry``.
+in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th ed., 9.3. Weights of luminance as
+in ``gen_data.core.colorimetry``.
 """
 
 import warp as wp
@@ -97,7 +97,7 @@ def make_brdf(
     loss = 1.0 / wp.max(part[0] + part[1], 0.05) - 1.0
     s.boost = wp.vec3(1.0, 1.0, 1.0) + s.f0 * loss
     s.gloss = wp.cw_mul(s.f0 * part[0] + wp.vec3(s.f90, s.f90, s.f90) * part[1], s.boost)
-    # The diffuse layer receives what the specular layer does not reflect; metals have none.
+    # The diffuse layer receives light that the specular layer does not reflect; metals have none.
     s.matte = wp.vec3(1.0 - s.gloss[0], 1.0 - s.gloss[1], 1.0 - s.gloss[2]) * (1.0 - metallic)
     return s
 
@@ -115,7 +115,7 @@ def specular_lobe(s: Brdf, n: wp.vec3, v: wp.vec3, l: wp.vec3, n_l: float, widen
     n_h = wp.min(wp.dot(n, h), 1.0)
     alpha = s.roughness * s.roughness
     wide = wp.min(alpha + widening, 1.0)
-    # Karis 2013: the peak falls by (alpha / wide)^2, so that a wider lobe has no more energy.
+    # Karis 2013: the peak falls by (alpha / wide)^2: a wider lobe must not have more energy.
     a2 = alpha * alpha
     q = n_h * n_h * (a2 - 1.0) + 1.0
     # Hammon 2017: Smith's height-correlated masking, without its two square roots.
@@ -147,8 +147,8 @@ def fresnel_dielectric(cosine: float, eta: float):
     """Reflectance of unpolarised light; 1 for total internal reflection.
 
     Args:
-        cosine: Of the angle of incidence, [0, 1].
-        eta: Refractive index behind the interface over that before it.
+        cosine: Cosine of the angle of incidence, [0, 1].
+        eta: Refractive index behind the interface divided by the index before it.
     """
     reflectance = float(1.0)
     # Snell's law; a squared sine above 1 has no refracted direction.
@@ -184,7 +184,7 @@ def pane_reflectance(f: float, tint: wp.vec3):
     """Reflectance of a thin pane with all inter-reflections.
 
     Args:
-        f: Of one face.
+        f: Reflectance of one face.
         tint: Transmittance of one passage.
     """
     # Geometric series: enter, reflect at the back face, leave; each further pair of reflections

@@ -1,6 +1,6 @@
 """Projection of points into the image, for every lens model.
 
-The equations and their sources are those of gen_data.core.lens, in single precision.
+The equations and their sources are in gen_data.core.lens; here in single precision.
 """
 
 import warp as wp

@@ -36,8 +36,7 @@ def is_translucent(world: records.World, surface: int):
 def sheet_normal(world: records.World, surface: int, hit: wp.vec2i, weight: wp.vec2):
     """Geometric normal of a translucent surface on its visible side; 0 for opaque surfaces.
 
-    Smooth normals of foliage lean out of the crown, so that they do not tell the sides of a leaf
-    apart.
+    Smooth normals of foliage lean out of the crown: they do not separate the sides of a leaf.
     """
     n = wp.vec3(0.0)
     if is_translucent(world, surface):
@@ -134,7 +133,7 @@ def apply_triplanar_texture(
     texels = footprint_m / scale_m * float(world.textures[texture].width)
     sampler = make_sampler(world, texture, wp.log2(wp.max(texels, 1.0e-3)))
     bumpy = world.textures[texture].has_bumps != 0
-    # Weights are eighth powers of the normal, so that projections blend in a narrow band only.
+    # Weights are eighth powers of the normal: projections blend in a narrow band only.
     w = wp.cw_mul(n, n)
     w = wp.cw_mul(w, w)
     w = wp.cw_mul(w, w)

@@ -2,10 +2,10 @@
 
 Offsets of ray origins avoid self-intersection. A point on a surface is known to half a unit in the
 last place of its largest coordinate, a relative error of 6e-8 in single precision, and the distance
-of a hit no better. Rays therefore start beside the surface: by a constant, for points near the
-world's origin, and by a share of the coordinates. Too large an offset loses contact shadows and
-thin panes. Source: Waechter and Binder, "A fast and robust method for avoiding self-intersection",
-Ray Tracing Gems, 2019, here in its plain form.
+of a hit no better. Rays therefore start off the surface: by a constant, for points near the world's
+origin, and by a share of the coordinates. Too large an offset loses contact shadows and thin panes.
+Source: Waechter and Binder, "A fast and robust method for avoiding self-intersection", Ray Tracing
+Gems, 2019, here in its plain form.
 """
 
 import warp as wp
@@ -74,7 +74,7 @@ def closest_hit(world: records.World, o: wp.vec3, d: wp.vec3, reach: float, thro
 
     Args:
         reach: Largest parameter along the ray.
-        through: What the ray may pass: HOLES, CLEAR or both.
+        through: Surfaces that the ray may pass: HOLES, CLEAR or both.
     """
     found = bvh_traverse.first_in_scene(
         world.tree, world.bodies, world.geometries, o, d, reach, through
@@ -276,7 +276,7 @@ def free_path_of_listed(
     world: records.World, lists: wp.array3d[int], tile: int, skip: int, path: Path
 ):
     """Unobstructed part of a path from a point of a tile, ignoring the body ``skip``."""
-    # The last list is that of ambient occlusion.
+    # The last list belongs to ambient occlusion.
     j = world.lamps.shape[0]
     free = float(1.0)
     count = lists[tile, j, 0]
@@ -305,7 +305,7 @@ def free_path_before(world: records.World, b: int, path: Path, free: float):
 def precipitation_exposure(world: records.World, body: int, origin: wp.vec3):
     """Exposure of a point on a body to precipitation: 1 or 0, by one upward ray.
 
-    Bodies that move shelter what moves, such as seats below a roof, but never the ground: it was
+    Moving bodies shelter moving surfaces, such as seats below a roof, but never the ground: it was
     in the rain before they came.
     """
     # The ray is tilted by a smooth function of position: edges of shelter become irregular, without

@@ -2,7 +2,7 @@
 
 // Parameter and code in one integer: positive floats compare like integers, nearest first.
 typedef unsigned long long Entry;
-// Ize 2013: 1 + twice the rounding error of a slab's parameter, so that no box is missed.
+// Ize 2013: 1 + twice the rounding error of a slab's parameter: no box is missed.
 constexpr float FARTHER = 1.0000004f;
 
 struct Ray {
@@ -37,7 +37,7 @@ auto start = [](Ray& ray, const wp::vec3& o, const wp::vec3& d) {
     ray.sy = ray.d[ray.ky] * ray.sz;
 };
 
-// Slab test of a node's eight boxes: push those that the ray enters, the nearest on top.
+// Slab test of a node's eight boxes: push the ones that the ray enters, the nearest on top.
 auto enter = [&](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted) {
     const int first = walk.top;
     for (int part = 0; part < 8; part += LANES) {

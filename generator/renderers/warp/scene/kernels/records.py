@@ -9,7 +9,7 @@ PINHOLE = wp.constant(0)
 BROWN_CONRADY = wp.constant(1)
 KANNALA_BRANDT = wp.constant(2)
 EQUIRECTANGULAR = wp.constant(3)
-# Flags of cut-outs: bits that rays match against what they may pass.
+# Flags of cut-outs: bits that rays compare with the kinds of surface that they may pass.
 HOLES = wp.constant(1)
 CLEAR = wp.constant(2)
 # Flag of bodies that move, which rays may pass as a whole.
@@ -234,7 +234,7 @@ class EnvironmentRecord:
 
 @wp.struct
 class VolumeRecord:
-    """A box with ambient light of its own.
+    """A box with separate ambient light.
 
     Attributes:
         low_m, high_m: Corners.

@@ -26,7 +26,7 @@
     auto get = [](auto v, int k) { return v[k]; };
     auto put = [](auto& v, int k, auto value) { v[k] = value; };
     auto lowest_bit = [](int bits) { return __builtin_ctz(bits); };
-    // Products of 16-bit halves take a fifth of the time of those of 32-bit integers.
+    // Products of 16-bit halves take a fifth of the time of products of 32-bit integers.
     auto weigh = [](Words pair, Words weight) {
         return (Words)((Halves)pair * (Halves)(weight | weight << 16));
     };

@@ -45,7 +45,8 @@ class Sampler:
 
     Attributes:
         first, width, height: First texel and size of the finer mip level.
-        coarser_first: Of the next level, blended with weight ``part``; unused if that is 0.
+        coarser_first: First texel of the next level, blended with weight ``part``; unused if that
+            is 0.
     """
 
     first: int
@@ -97,7 +98,7 @@ def taps_at(first: int, width: int, height: int, u: float, v: float):
     t.b = first + y0 * width + x1
     t.c = first + y1 * width + x0
     t.d = first + y1 * width + x1
-    # Three weights are derived from one product, so that all four sum to exactly 256.
+    # Three weights are derived from one product: all four sum to exactly 256.
     t.wd = (right * down) >> wp.uint32(8)
     t.wb = right - t.wd
     t.wc = down - t.wd

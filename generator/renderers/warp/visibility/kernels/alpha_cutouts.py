@@ -13,10 +13,10 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll":
 
 @wp.struct
 class Cutout:
-    """Where a triangle has holes.
+    """Holes of a triangle.
 
     The coordinate u at image point (x, y) and depth z is ``u + (c_u + x * dx_u + y * dy_u) * z``,
-    with x and y in pixels and z in metres; v likewise.
+    with x and y in pixels and z in metres; v correspondingly.
 
     Attributes:
         texture: The texture that cuts the holes; -1 for a solid triangle.

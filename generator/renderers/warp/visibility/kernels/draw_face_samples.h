@@ -70,7 +70,7 @@ scan(reach, matter, [&](int x, int y, unsigned reached, auto at) {
                 changed = drawn;
             }
         }
-        // What lies behind all samples of a pixel need not be looked at again.
+        // Surfaces behind all samples of a pixel need no further test.
         if (changed) {
             float farthest = nearness.data[first];
             for (int s = 1; s < samples; ++s)

@@ -1,7 +1,7 @@
 """Anti-aliasing of radiance at edges, by rays.
 
 Coverage is sampled at several points of a pixel; colour is taken from nearby pixel centres that
-show the same surface, so that nothing is shaded twice.
+show the same surface: no point is shaded twice.
 
 Source: Chajdas, McGuire and Luebke, "Subpixel reconstruction antialiasing", I3D 2011.
 """

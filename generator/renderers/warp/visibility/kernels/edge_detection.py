@@ -1,4 +1,4 @@
-"""Detection of edges between surfaces, and of similar pixels beside them.
+"""Detection of edges between surfaces, and of similar pixels next to them.
 
 Source: Chajdas, McGuire and Luebke, "Subpixel reconstruction antialiasing", I3D 2011.
 """

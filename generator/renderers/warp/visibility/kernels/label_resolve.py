@@ -13,7 +13,7 @@ class Facet:
 
     For a direction d in the camera frame and ``det = d . across``: the barycentric weights of the
     second and third vertex are ``d . along_u / det`` and ``d . along_v / det``, z-depth is ``depth
-    / det``, and the sign of ``det`` tells front from back. Source: Moeller and Trumbore, "Fast,
+    / det``, and the sign of ``det`` separates front from back. Source: Moeller and Trumbore, "Fast,
     minimum storage ray-triangle intersection", 1997, with the products of the triangle's own
     vectors precomputed.
 
@@ -160,7 +160,7 @@ def resolve(
 
 @wp.kernel
 def label_ids(hits: wp.array[wp.vec2i], ids: wp.array[wp.uint16], labels: wp.array[wp.uint16]):
-    """Id of the body at every pixel; ``ids[0]`` is the background's, ``ids[1 + b]`` that of b."""
+    """Id of the body at every pixel; ``ids[0]`` is the background's, ``ids[1 + b]`` is b's."""
     i = wp.tid()
     labels[i] = ids[hits[i][0] + 1]
 

@@ -49,7 +49,7 @@ def number_pixels(
 ):
     """Position in the list of every listed pixel, and the least nearness that matters there.
 
-    A surface behind all those of the surrounding centres has no colour to take.
+    A surface behind all surfaces of the surrounding centres finds no colour.
 
     Args:
         floors: 1/z [1/m]; must be UNLISTED on entry.
@@ -181,8 +181,8 @@ def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int
 def shows_like(view: View, world: World, images: GBufferRecord, source: int, hit: wp.vec2i):
     """Whether a pixel's colour suits a (body, face): it shows that, or a like continuation of it.
 
-    That is of one material, faces alike and lies in one plane: the front of a door does not
-    stand for the frame in the gap beside it.
+    A like continuation has the same material and orientation and lies in the same plane: the front
+    of a door does not replace the frame in the gap next to it.
     """
     alike = bool(False)
     if source >= 0:
@@ -239,7 +239,7 @@ def find_thin(
 
     Args:
         pixels: The pixels.
-        hits: Their samples, which repeat those of ``offsets``.
+        hits: Their samples, which repeat the samples of ``offsets``.
         offsets: Sample positions within a pixel, [0, 1).
         layer: Number of surfaces found before, at most.
         layers: The (body, face) of all layers; (-1, -1) if there is none in ``layer``.
@@ -294,8 +294,8 @@ def mix_samples(
     """Radiance of listed pixels: the mean over their samples, in the order of the list.
 
     Args:
-        thin: Layers of surfaces by ``find_thin``; none if what no centre shows is left out.
-        thin_radiance: Of those surfaces.
+        thin: Layers of surfaces by ``find_thin``; none if surfaces shown by no centre are omitted.
+        thin_radiance: Radiance of these surfaces.
         white: Radiance that saturates one exposure; 0 = the mean is one of radiance.
         brightest: Radiance that saturates all exposures.
     """

@@ -1,4 +1,4 @@
-"""Photographs behind rendered things, at pixel centres."""
+"""Photographs behind rendered objects, at pixel centres."""
 
 from typing import Any
 
@@ -6,11 +6,11 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
-# What a pixel's centre shows, by the number of its body plus one.
+# Content of a pixel's centre, by the number of its body plus one.
 EMPTY = wp.constant(0)
 GROUND = wp.constant(1)
 THING = wp.constant(2)
-# What the photograph shows there.
+# Content of the photograph there.
 BACKGROUND = wp.constant(0)
 STANDING_GROUND = wp.constant(1)
 FOREGROUND = wp.constant(2)
@@ -34,10 +34,10 @@ def show_photo(
         kinds: EMPTY, GROUND or THING, by body plus one.
         first: Pixel of the photograph that the first one of these shows.
         photo: Radiance of the photograph.
-        unshaded: Radiance of the ground without things.
-        darkest: Radiance without things below which the ground has no ratio.
+        unshaded: Radiance of the ground without objects.
+        darkest: Radiance without objects below which the ground has no ratio.
         ratio_max: Largest ratio.
-        radiance: Of the pixels, changed in place.
+        radiance: Radiance of the pixels, changed in place.
     """
     i = wp.tid()
     kind = kinds[hits[i][0] + 1]
@@ -62,7 +62,7 @@ def restore_photo(
     centres: wp.array[wp.vec3],
     radiance: wp.array[wp.vec3],
 ):
-    """Take the radiance of pixel centres wherever none of the nine pixels around shows a thing."""
+    """Take the radiance of pixel centres where none of the nine pixels around shows an object."""
     y, x = wp.tid()
     if radiance[y * width + x] == centres[y * width + x]:
         return
@@ -94,7 +94,7 @@ def hide_labels(
     nothing: Any,
     image: wp.array(dtype=Any),
 ):
-    """Write nothing where the foreground is, or neither a thing nor ground to stand on.
+    """Write nothing at the foreground, or where there is neither an object nor ground to stand on.
 
     Args:
         shown: BACKGROUND, STANDING_GROUND or FOREGROUND, by pixel of the photograph.

@@ -150,7 +150,7 @@ def project_vertices(
     """Vertices in the camera frame and on the snapped image plane, of listed bodies.
 
     Args:
-        extents: Of each listed body, in as many parts as threads share the work on it; the depth of
+        extents: Extents of each listed body, in one part per thread that works on it; the depth of
             a part without vertices is negative.
     """
     row, part = wp.tid()
@@ -436,7 +436,7 @@ def draw_bodies(
 ):
     """Z-buffer of listed bodies: the nearest (body, face) at every pixel centre.
 
-    Bodies with cut-outs come last, so that few of their pixels need the alpha test.
+    Bodies with cut-outs come last: few of their pixels then need the alpha test.
 
     Args:
         nearness: 1/z [1/m]; must be 0 on entry. It and ``hits`` are LANES longer than the image.

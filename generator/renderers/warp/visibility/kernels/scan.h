@@ -1,6 +1,6 @@
 // Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets a group's first pixel
-// and tells which of its pixels matter, before edges are evaluated. ``visit(x, y, inside, at)`` gets
-// those of them that are inside all edges, moved outwards by ``reach``; ``at(k)`` has the edge
+// and returns the pixels that matter, before edges are evaluated. ``visit(x, y, inside, at)`` gets
+// the pixels of these inside all edges, moved outwards by ``reach``; ``at(k)`` has the edge
 // functions at the group's k-th pixel: integers below 2^51, which double precision holds and adds
 // exactly. Needs ``edges``, and simd.h before it.
 

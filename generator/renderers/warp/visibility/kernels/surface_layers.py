@@ -91,7 +91,7 @@ def trace_behind(
         view, world: Camera and scene.
         hits, depths: First surface of every pixel, as of GBuffer.
         materials: Number of each material.
-        see_through: Number of those that rays continue behind.
+        see_through: Number of the materials behind which rays continue.
         pixels: The listed pixels.
         behind: (body, material) of each ray's later surfaces; (-1, -1) for none.
         z_m: Their depths along the optical axis.
