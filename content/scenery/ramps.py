@@ -34,7 +34,7 @@ def door_ramp(seed: int, tops_m: tuple[float, ...], width_m: float) -> Solid:
     The origin is on the ground below its upper end. Slots: stone, metal.
 
     Args:
-        seed: Of the stone and the metal: each of a few in turn.
+        seed: Seed of stone and metal, which cycle through a few kinds each.
         tops_m: Distance from the upper end and height, in turn, at each change of gradient.
         width_m: With the curbs.
 

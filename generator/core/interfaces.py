@@ -193,7 +193,7 @@ class DerivedArrays(Protocol):
         ...
 
     def is_stored(self, asset_id: str) -> bool:
-        """Whether arrays of that asset are stored; those of others are computed in each process."""
+        """Whether arrays of that asset are stored; each process computes the arrays of others."""
         ...
 
 

@@ -34,7 +34,7 @@ _RAMP_M, _TURN_M, _RUN_M, _FALL = 1.4, 1.5, 6.0, 0.06
 _STEP_M, _SHORTEST_M, _LONGEST_M = 0.05, 1.0, 13.5
 """Lengths of ramps are multiples of the first, from the second up to two runs and a rest."""
 _STOREY_M, _STEPS_WIDE_M, _EVEN_M = 1.0, 1.0, 0.05
-"""Height of points at the foot of walls; half the width of what may belong to steps at doors;
+"""Height of points at the foot of walls; half the width of the zone in which steps belong to a door;
 difference up to which fronts are one."""
 _SILL_M = 0.2
 """Highest steps of a house itself above the landing of a ramp."""
@@ -44,7 +44,7 @@ how much they may reach out from the door."""
 _PATH_M, _PATH_SUNK_M = 1.6, 0.045
 """Width of the strip for the path between a ramp and the one to the door; depth of its slabs."""
 _AT_DOOR_M = 0.7
-"""A path whose middle is no farther from a door leads to it."""
+"""A path whose middle is at most this far from a door leads to it."""
 _NEAR_M = 25.0
 """Bodies farther than this from a door are not in the way of its ramp."""
 _ALLEY = frozenset({"garden", "frontage"})
@@ -98,7 +98,7 @@ class Land:
     Attributes:
         ways: Lanes on which nothing of a house may stand.
         gardens: Lanes between the street and the houses.
-        relief: Of the ground.
+        relief: Relief of the ground.
     """
 
     ways: Ways
@@ -125,10 +125,10 @@ def fronts_m(
     Args:
         house: It has a door.
         y_m: From its right to its left end.
-        assets: Of the house.
+        assets: Library with the house.
 
     Returns:
-        For each part its ends in y, and the x of what reaches out most up to 1 m above the floor;
+        For each part its ends in y, and the largest x of the wall up to 1 m above the floor;
         steps at doors do not count. One part if both reach out by the same.
     """
     points = assets.vertices_m(house.asset)
@@ -156,7 +156,7 @@ def entrances(
         floor_m: Rise of the house above it.
         level: All bodies in the level world.
         land: The ground on which they stand.
-        assets: Of all bodies.
+        assets: Library with all bodies.
     """
     lifted = SE3((0.0, 0.0, floor_m)) @ house.T_world_body
     made: list[Body] = []
@@ -184,7 +184,7 @@ class _Site:
         T_world_door: The door at the height of the floor, X away from the house.
         slabs: Seed of the path to the door.
         land: The ground.
-        assets: Of all bodies.
+        assets: Library with all bodies.
     """
 
     house: Body
@@ -248,7 +248,7 @@ def _slabs(T_world_door: SE3, level: Sequence[Body], assets: AssetLibrary) -> in
 
 
 def _has_ramp(house: Body) -> bool:
-    """Whether a house has a ramp, by a digest of what it is and where it stands."""
+    """Whether a house has a ramp, by a digest of its id and its place."""
     share = families.declared(house.asset, RAMPS, None) or 0.0
     x, y, _ = house.T_world_body.translation_m
     digest = zlib.crc32(f"{house.asset} {x:.3f} {y:.3f}".encode())

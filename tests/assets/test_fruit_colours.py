@@ -1,4 +1,4 @@
-"""Colours of fruit are those that colorimeters and spectrometers measured.
+"""Colours of fruit, as colorimeters and spectrometers measured them.
 
 CIELAB under D65, converted by OpenCV. Sources: docs/decisions/assets.md.
 """

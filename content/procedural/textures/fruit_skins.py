@@ -115,8 +115,8 @@ def citrus_peel(rng: VariantRng) -> TextureData:
 def banana_peel(rng: VariantRng, ripe: float = -1.0) -> TextureData:
     """From green over yellow to spotted brown, with dark tips; ``ripe`` in [0, 1], below 0 = drawn.
 
-    The stem is at the lower end of the image. Hues by ripeness are those that Ringer and Blanke
-    (2021) measured at stages R2 to R7; green, the peel that has just turned and brown spots are
+    The stem is at the lower end of the image. Ringer and Blanke (2021) measured the hues of
+    ripeness stages R2 to R7; green, the peel that has just turned and brown spots are
     from Kajuna et al. (1995; a*) and from spectra of Vrhel et al. (1994). Lightness and chroma of
     the other stages are assumed.
     """

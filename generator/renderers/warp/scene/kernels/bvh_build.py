@@ -42,8 +42,8 @@ def grow_tree(
     """Build one tree; launched with a single thread, on the CPU.
 
     Args:
-        boxes: Low corner, number, minus high corner, 0 [n, 8]; permuted: those of a node are
-            contiguous.
+        boxes: Low corner, number, minus high corner, 0 [n, 8]; permuted: the boxes of a
+            node are contiguous.
         leaf: Maximum number of boxes in a leaf.
         quick: 1 to cut parts in the middle of their longest side; 0 by the surface area heuristic.
         nodes: Bounds: low x, high x, low y, ... [., 6, 8]; no ray enters unused lanes.
@@ -68,8 +68,8 @@ def fill_leaves(
     Args:
         boxes: As ``grow_tree`` leaves them.
         leaves: As ``grow_tree`` leaves them.
-        vertices_m: Of the mesh.
-        faces: Of the mesh [n, 3].
+        vertices_m: Vertices of the mesh.
+        faces: Faces of the mesh [n, 3].
         corners_m: Groups of leaves [., 10, 8]: x of first, second and third corners, y, z; 0 in
             lanes without a face.
         numbers: The same memory as integers; the last group of each leaf is filled with the numbers
