@@ -34,7 +34,7 @@ _RAMP_M, _TURN_M, _RUN_M, _FALL = 1.4, 1.5, 6.0, 0.06
 _STEP_M, _SHORTEST_M, _LONGEST_M = 0.05, 1.0, 13.5
 """Lengths of ramps are multiples of the first, from the second up to two runs and a rest."""
 _STOREY_M, _STEPS_WIDE_M, _EVEN_M = 1.0, 1.0, 0.05
-"""Height of points at the foot of walls; half the width of the zone in which steps belong to a door;
+"""Height of points at the foot of walls; half the width of the zone of steps at a door;
 difference up to which fronts are one."""
 _SILL_M = 0.2
 """Highest steps of a house itself above the landing of a ramp."""
