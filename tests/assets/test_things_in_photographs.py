@@ -146,7 +146,9 @@ def test_slices_of_fruit_are_discs_of_flesh_with_a_rim_of_skin(group: str) -> No
     normals = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     up = normals[:, 2] / np.linalg.norm(normals, axis=1).clip(1e-12)
     length_m, width_m, thick_m = np.ptp(mesh.vertices_m, axis=0).astype(np.float64).tolist()
-    volume_m3 = np.einsum("ij,ij->", corners_m[:, 0], np.cross(corners_m[:, 1], corners_m[:, 2])) / 6
+    volume_m3 = (
+        np.einsum("ij,ij->", corners_m[:, 0], np.cross(corners_m[:, 1], corners_m[:, 2])) / 6
+    )
 
     assert 0.0035 < thick_m < 0.013
     assert 0.94 < volume_m3 / (0.25 * np.pi * length_m * width_m * thick_m) < 1.0
