@@ -53,7 +53,8 @@ class FruitStyle:
         skin_first: Seed of the texture of the first variant.
         stalk: ``twig``, ``button``, ``calyx``, ``stump``, ``crown`` or empty.
         leaf: Probability of a leaf.
-        cut: Kind of ``fruit_cut`` of a halved fruit; empty = whole.
+        cut: Kind of ``fruit_cut`` of a cut fruit; empty = whole.
+        thick_m: Thickness of a slice [m]; 0 = a half.
         lying: Whether it rests on its side, along X.
     """
 
@@ -75,6 +76,7 @@ class FruitStyle:
     stalk: str = ""
     leaf: float = 0.0
     cut: str = ""
+    thick_m: Point2 = (0.0, 0.0)
     lying: bool = False
 
 
@@ -94,7 +96,7 @@ def round_fruit_facts(group: str, seed: int) -> Facts:
 
 
 def round_fruit(group: str, seed: int) -> Solid:
-    """A fruit of a group, whole or halved. Slots: skin, then flesh, stalk, leaf."""
+    """A fruit of a group, whole, halved or a slice. Slots: skin, then flesh, stalk, leaf."""
     rng, style = variant_rng(group, seed), STYLES[fruit_kind(group, seed)]
     shape, top = _draw_shape(style, rng)
     skin = f"texture/fruit_skin?kind={style.skin}&seed={seed}"
@@ -102,7 +104,7 @@ def round_fruit(group: str, seed: int) -> Solid:
         skin = f"texture/{style.skin}?seed={style.skin_first + seed}"
     materials = [printed_material(skin, rng.between(*style.roughness))]
     if style.cut:
-        patches = _half(shape)
+        patches = _cut(shape, rng.between(*style.thick_m) if style.thick_m[1] else 0.0)
         flesh = f"texture/fruit_cut?kind={style.cut}&seed={seed}"
         materials.append(printed_material(flesh, 0.3))
         parts = [hulls.extreme(patches[0].corners_m)]
@@ -159,23 +161,50 @@ def _draw_shape(style: FruitStyle, rng: VariantRng) -> tuple[Callable[[Array], A
     return shape, float(peak[2])
 
 
-def _half(shape: Callable[[Array], Array]) -> list[Patch]:
-    """The lower half and its cut; on the cut v runs from the rim to the middle."""
+def _cut(shape: Callable[[Array], Array], thick_m: float) -> list[Patch]:
+    """The lower half or a slice below the middle; on a cut v runs from the rim to the middle.
+
+    Args:
+        shape: Mapping of directions to points [m].
+        thick_m: Thickness of the slice [m]; 0 = a half.
+    """
     rings, segments = 14, 40
-    polar = 0.5 * math.pi * (np.arange(rings + 1) / rings - 1.0)
+    depth = _polar_of(shape, thick_m) if thick_m else 0.5 * math.pi
+    polar = depth * (np.arange(rings + 1) / rings - 1.0)
     turn = 2.0 * math.pi * np.arange(segments) / segments - math.pi
     turn = np.concatenate([turn, turn[:1]])
     radius = np.cos(polar)
-    radius[0] = 0.0
+    if not thick_m:
+        radius[0] = 0.0
     x, y = radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn)
     d = np.stack(np.broadcast_arrays(x, y, np.sin(polar)[:, None]), axis=2)
     skin = shape(d)
-    rim = skin[-1]
-    share = np.array([1.0, 0.9, 0.7, 0.45, 0.2, 0.0])[:, None, None]
+    lowest = 0.5 - depth / math.pi
+    inward = 1.0 - _FACE_SHARES
+    patches = [
+        shapes.grid(skin, v=np.linspace(lowest, 0.5, rings + 1)),
+        shapes.grid(_face(skin[-1]), v=inward, slot=1),
+    ]
+    if thick_m:
+        patches.append(shapes.grid(_face(skin[0])[::-1], v=inward[::-1], slot=1))
+    return patches
+
+
+_FACE_SHARES = np.array([1.0, 0.9, 0.7, 0.45, 0.2, 0.0])
+
+
+def _face(rim: Array) -> Array:
+    """Points of the cut inside a rim [n, 3], from the rim to the middle [6, n, 3]."""
     middle = np.array([0.0, 0.0, float(rim[:, 2].mean())])
-    cut = middle + share * (rim - middle)[None]
-    v = 1.0 - share[:, 0, 0]
-    return [shapes.grid(skin, v=np.linspace(0.0, 0.5, rings + 1)), shapes.grid(cut, v=v, slot=1)]
+    points: Array = middle + _FACE_SHARES[:, None, None] * (rim - middle)[None]
+    return points
+
+
+def _polar_of(shape: Callable[[Array], Array], depth_m: float) -> float:
+    """Angle below the horizon [rad] at which a fruit is this far below its middle."""
+    polar = np.linspace(0.0, 1.2, 97)
+    points = shape(np.stack([np.cos(polar), np.zeros(97), -np.sin(polar)], axis=1)[None])[0]
+    return float(np.interp(depth_m, points[0, 2] - points[:, 2], polar))
 
 
 Stalk = tuple[Patch, Material]

@@ -11,6 +11,7 @@ from PIL import ImageFont
 from gen_data import content
 from gen_data.content.procedural import TEXTURES
 from gen_data.content.procedural.packaging import can_size
+from gen_data.content.procedural.textures.texture_images import color, mix_colors
 from gen_data.core.asset_types import TextureData
 from gen_data.core.noise import fbm, perlin, quick_perlin, worley
 from gen_data.core.streams import Streams
@@ -193,3 +194,15 @@ def test_every_printed_character_has_a_glyph() -> None:
     box = glyphs.pop("\uffff")
     assert foreign == set()
     assert {c for c, glyph in glyphs.items() if glyph == box} == set()
+
+
+def test_colors_are_mixed_by_weights_of_rows() -> None:
+    """Of one column, as of the ends of a peel: the last row has the second colour."""
+    image = np.full((3, 4, 3), 0.25, np.float32)
+    weights = np.array([[0.0], [0.5], [2.0]], np.float32)
+
+    mixed = mix_colors(image, color("#ff0000"), weights)
+
+    assert mixed.shape == (3, 4, 3)
+    np.testing.assert_allclose(mixed[:, 0, 0], [0.25, 0.625, 1.0])
+    np.testing.assert_allclose(mixed[2, :, 1:], 0.0)

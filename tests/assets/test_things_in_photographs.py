@@ -8,6 +8,7 @@ import pytest
 from gen_data.assets.families import declared
 from gen_data.content.procedural import FAMILIES, containers, fruit_bough
 from gen_data.content.procedural.bottles import choose_bottle
+from gen_data.content.procedural.fruit import fruit_kind
 from gen_data.content.procedural.textures.pictures import MANNERS, picture
 from gen_data.content.procedural.textures.tableware_prints import ceramic_decor
 from gen_data.content.procedural.vessel_contents import CONTENTS
@@ -134,3 +135,22 @@ def _contains(part: np.ndarray, point: np.ndarray) -> bool:
 
     equations = ConvexHull(part).equations
     return bool((equations[:, :3] @ point + equations[:, 3] <= 1e-9).all())
+
+
+@pytest.mark.parametrize("group", ["apple", "orange", "lemon", "lime", "kiwi"])
+def test_slices_of_fruit_are_discs_of_flesh_with_a_rim_of_skin(group: str) -> None:
+    """Both faces are flesh; the volume is that of a disc with a slightly round rim."""
+    seed = next(seed for seed in range(60) if fruit_kind(group, seed) == f"{group}/slice")
+    mesh = FAMILIES[group].build(seed=seed).mesh
+    corners_m = mesh.vertices_m.astype(np.float64)[mesh.faces]
+    normals = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
+    up = normals[:, 2] / np.linalg.norm(normals, axis=1).clip(1e-12)
+    length_m, width_m, thick_m = np.ptp(mesh.vertices_m, axis=0).astype(np.float64).tolist()
+    volume_m3 = (
+        np.einsum("ij,ij->", corners_m[:, 0], np.cross(corners_m[:, 1], corners_m[:, 2])) / 6
+    )
+
+    assert 0.0035 < thick_m < 0.013
+    assert 0.94 < volume_m3 / (0.25 * np.pi * length_m * width_m * thick_m) < 1.0
+    assert (up[mesh.face_slots == 1] > 0.99).sum() == (up[mesh.face_slots == 1] < -0.99).sum()
+    assert np.abs(up[mesh.face_slots == 0]).max() < 0.6

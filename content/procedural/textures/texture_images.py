@@ -71,9 +71,13 @@ def draw_color(codes: Sequence[str], spread: float, rng: VariantRng) -> Float32:
 
 
 def mix_colors(a: Float32, b: Float32, t: NDArray[np.floating[Any]]) -> Float32:
-    """Colours mixed per pixel: ``a`` where t is 0, ``b`` where it is 1; t has shape [n, n]."""
+    """Colours mixed per pixel: ``a`` where t is 0, ``b`` where it is 1.
+
+    The shapes of a and b without their last axis, and of t, are broadcast: [n, n], [n, 1], [].
+    """
     weight = np.clip(t, 0.0, 1.0).astype(np.float32)
-    rest, blend = 1 - weight, np.zeros((*weight.shape, 3), np.float32)
+    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1], weight.shape)
+    rest, blend = 1 - weight, np.zeros((*shape, 3), np.float32)
     # Channel by channel: arithmetic along an axis of three takes several times as long.
     for channel in range(3):
         blend[..., channel] = a[..., channel] * rest + b[..., channel] * weight
