@@ -1,7 +1,6 @@
 """Pedestrian crossings."""
 
-from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -10,7 +9,7 @@ from gen_data.core import errors, interfaces
 from gen_data.core.scene import Lane, Scene
 from gen_data.roads.cross_section import height_m, non_default_fields
 from gen_data.roads.lane_graph import world_points
-from gen_data.scene_templates.element import Element, name_relations, parametric_id
+from gen_data.scene_templates.element import Element, parametric_id
 from gen_data.scene_templates.road import add_street, find_road
 
 
@@ -24,16 +23,13 @@ class Crosswalk(Element):
         style: Bars, or a ladder: bars between two lines.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("road",)
+
     type: Literal["crosswalk"] = "crosswalk"
     road: str = Field(examples=["main"])
     station_m: float = Field(40.0, ge=0)
     width_m: float = Field(4.0, ge=1.5, le=20)
     style: Literal["zebra", "ladder"] = "zebra"
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road."""
-        return name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the markings on the road, and the lane of the pedestrians."""

@@ -1,14 +1,13 @@
 """Ego vehicles, which carry the sensors."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
 from gen_data.core import errors, interfaces, lane_geometry
 from gen_data.core.scene import Body, Instance, Rig, Scene
-from gen_data.scene_templates.element import Element, name_relations, next_instance_id
+from gen_data.scene_templates.element import Element, next_instance_id
 from gen_data.traffic.axles import find_axles
 
 CATEGORY = "ego"
@@ -27,15 +26,12 @@ class Ego(Element):
         lane: Name of the lane in the middle of which it stands; empty = the first driving lane.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("lane",)
+
     type: Literal["ego"] = "ego"
     asset: str = ""
     tags: tuple[str, ...] = Field(("car",), min_length=1)
     lane: str = ""
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road of its lane."""
-        return name_relations(lane=self.lane)
 
     def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the vehicle and its rig."""

@@ -4,7 +4,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -24,6 +24,9 @@ class Element(Strict):
             groups. Randomizers leave an absent group alone.
     """
 
+    related: ClassVar[tuple[str, ...]] = ()
+    """Fields that name other elements; may be empty texts."""
+
     name: str = Field(pattern=NAME_PATTERN)
     present: bool = True
 
@@ -34,8 +37,12 @@ class Element(Strict):
 
     @property
     def relations(self) -> Mapping[str, str]:
-        """Names of the elements that it needs, by the field that names them; no empty names."""
-        return {}
+        """Names of the elements that it needs, by the field that names them; no empty names.
+
+        A field may name a part of an element, such as ``cross/0``.
+        """
+        names: dict[str, str] = {field: getattr(self, field) for field in self.related}
+        return {field: name.partition("/")[0] for field, name in names.items() if name}
 
     def leave_out(self, scene: Scene) -> Scene:
         """Return the scene of an absent element: unchanged, or with its group of no objects."""
@@ -60,14 +67,11 @@ class PlacedElement(Element):
         yaw_deg: Rotation about the vertical.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("on",)
+
     on: str = ""
     at_m: tuple[float, float] | tuple[float, float, float] = (0.0, 0.0)
     yaw_deg: float = 0.0
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The element that supports it."""
-        return name_relations(on=self.on)
 
     def pose(self, scene: Scene) -> SE3:
         """``T_world_element``: origin on the support, Z up."""
@@ -90,15 +94,6 @@ class PlacedElement(Element):
         pose = (self.pose(scene) @ SE3((0.0, 0.0, height_m))).rounded()
         own = {"name": self.name, "body": self.name, "T_world_surface": pose, "size_m": size_m}
         return replace(scene, surfaces=(*scene.surfaces, SupportSurface(**{**own, **fields})))
-
-
-def name_relations(**names: str) -> dict[str, str]:
-    """Elements by field: the part of each name before a slash; fields without a name are left out.
-
-    Args:
-        names: Names of elements, or of their parts such as ``cross/0``, by field.
-    """
-    return {field: name.partition("/")[0] for field, name in names.items() if name}
 
 
 def level_pose(at_m: tuple[float, float] | tuple[float, float, float], yaw_deg: float) -> SE3:

@@ -1,9 +1,8 @@
 """Fields next to a road."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -15,7 +14,7 @@ from gen_data.core.se3 import SE3
 from gen_data.core.variant_rng import variant_rng
 from gen_data.roads.cross_section import RoadShape, non_default_fields, strips
 from gen_data.roads.fields_shape import FieldsShape, Parcel
-from gen_data.scene_templates.element import Element, add_background, name_relations, parametric_id
+from gen_data.scene_templates.element import Element, add_background, parametric_id
 from gen_data.scene_templates.road import find_road
 
 Crop = Literal[
@@ -45,6 +44,8 @@ class Fields(Element):
         seed: Seed of parcels, crops and bales.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("road",)
+
     type: Literal["fields"] = "fields"
     road: str = Field(examples=["main"])
     sides: tuple[Literal["left", "right"], ...] = Field(("left", "right"), min_length=1)
@@ -53,11 +54,6 @@ class Fields(Element):
     depth_m: float = Field(75.0, ge=10, le=300)
     bales: float = Field(0.5, ge=0, le=1)
     seed: int = Field(0, ge=0, le=1_000_000)
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road."""
-        return name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add one body per side, and the bales."""

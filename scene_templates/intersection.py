@@ -1,7 +1,6 @@
 """Intersections: the common part of junctions and roundabouts."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
@@ -35,6 +34,8 @@ class Intersection(road.RoadSurface, element.Element):
         crossings: Style of the crosswalks; lines as at traffic lights, a ladder has bars and lines.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("after",)
+
     FAMILY: ClassVar[str]
     """Family of its surface."""
 
@@ -52,11 +53,6 @@ class Intersection(road.RoadSurface, element.Element):
     crown: float = Field(0.025, ge=0, le=0.08)
     traffic: Literal["right", "left"] = "right"
     crossings: Literal["zebra", "ladder", "lines", "none"] = "zebra"
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road that leads to it."""
-        return element.name_relations(after=self.after)
 
     @abstractmethod
     def shape(self) -> Shape:

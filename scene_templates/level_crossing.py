@@ -1,8 +1,7 @@
 """Level crossings of roads and railways."""
 
 import math
-from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -33,16 +32,13 @@ class LevelCrossing(element.Element):
         seed: Seed of the barriers' design.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("road",)
+
     type: Literal["level_crossing"] = "level_crossing"
     road: str = Field(examples=["main"])
     station_m: float = Field(60.0, ge=0)
     track_m: float = Field(80.0, ge=10, le=400)
     seed: int = Field(0, ge=0, le=1_000_000)
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road."""
-        return element.name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the surface as background; the track next to the road and the barriers take room."""

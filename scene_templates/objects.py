@@ -1,9 +1,9 @@
 """Groups of objects on surfaces, at first in rows and clear of other elements."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -111,6 +111,8 @@ class Objects(element.Element):
         annotate: Whether to write labels for them.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("on",)
+
     type: Literal["objects"] = "objects"
     on: str = Field(examples=["table"])
     count: int = Field(8, ge=0, le=500)
@@ -122,11 +124,6 @@ class Objects(element.Element):
     def follows_others(self) -> bool:
         """True: objects keep clear of all other elements on their surfaces."""
         return True
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The element that supports them."""
-        return element.name_relations(on=self.on)
 
     def leave_out(self, scene: Scene) -> Scene:
         """Return the scene with a group of no objects, whose name randomizers accept."""

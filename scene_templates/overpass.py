@@ -1,8 +1,7 @@
 """Bridges over roads."""
 
 import math
-from collections.abc import Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -31,6 +30,8 @@ class Overpass(element.Element):
         seed: Seed of its colours.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("road",)
+
     type: Literal["overpass"] = "overpass"
     road: str = Field(examples=["main"])
     station_m: float = Field(60.0, ge=0)
@@ -39,11 +40,6 @@ class Overpass(element.Element):
     kind: Literal["concrete", "steel"] = "concrete"
     ramp_m: float = Field(45.0, ge=5, le=200)
     seed: int = Field(0, ge=0, le=1_000_000)
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road."""
-        return element.name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the deck as background, and the ends, which take room."""

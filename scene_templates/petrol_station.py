@@ -1,9 +1,8 @@
 """Petrol stations next to roads."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -40,17 +39,14 @@ class PetrolStation(element.Element):
         seed: Seed of the brand, of all parts and of the cars.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("road",)
+
     type: Literal["petrol_station"] = "petrol_station"
     road: str = Field(examples=["main"])
     station_m: float = Field(60.0, ge=0)
     side: Literal["left", "right"] = "right"
     cars: float = Field(0.5, ge=0, le=1)
     seed: int = Field(0, ge=0, le=1_000_000)
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road."""
-        return element.name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the forecourt as background; canopy, shop and sign take room."""

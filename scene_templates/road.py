@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -25,7 +24,6 @@ from gen_data.scene_templates.element import (
     Element,
     add_background,
     level_pose,
-    name_relations,
     parametric_id,
 )
 
@@ -135,6 +133,8 @@ class Road(RoadSurface, Element):
         speed_m_s: Usual speed.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("after",)
+
     type: Literal["road"] = "road"
     after: str = ""
     at_m: tuple[float, float] | tuple[float, float, float] = (0.0, 0.0)
@@ -165,11 +165,6 @@ class Road(RoadSurface, Element):
     tram: bool = False
     apron_m: float = Field(6.0, ge=0, le=100)
     speed_m_s: float = Field(13.9, ge=0, le=60)
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road or junction that it continues."""
-        return name_relations(after=self.after)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the road as background, and link its lanes to the roads that it meets."""

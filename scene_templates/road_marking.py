@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -12,7 +11,7 @@ from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Scene
 from gen_data.roads.cross_section import RoadShape, non_default_fields, strips
-from gen_data.scene_templates.element import Element, add_background, name_relations, parametric_id
+from gen_data.scene_templates.element import Element, add_background, parametric_id
 from gen_data.scene_templates.road import find_road
 
 Sign = Literal[
@@ -38,6 +37,8 @@ class RoadMarking(Element):
         width_m: Their width; null = 2 m for these, else the lane's width.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("road",)
+
     type: Literal["road_marking"] = "road_marking"
     road: str = Field(examples=["main"])
     sign: Sign = "straight"
@@ -47,11 +48,6 @@ class RoadMarking(Element):
     offset_m: float = Field(0.0, ge=-10, le=10)
     length_m: float = Field(8.0, ge=1, le=100)
     width_m: float | None = Field(None, ge=0.5, le=12)
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road."""
-        return name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the paint as background."""

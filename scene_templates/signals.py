@@ -1,8 +1,7 @@
 """Traffic lights of a junction."""
 
 import math
-from collections.abc import Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -25,17 +24,14 @@ class Signals(element.Element):
         annotate: Whether to write labels for them.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("junction",)
+
     type: Literal["signals"] = "signals"
     junction: str = Field(examples=["cross"])
     mount: Literal["pole", "mast_arm"] = "pole"
     beside_m: float = Field(0.0, ge=0, le=20)
     seed: int = Field(0, ge=0, le=1_000_000)
     annotate: bool = False
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The junction."""
-        return element.name_relations(junction=self.junction)
 
     def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add one light per incoming road."""

@@ -1,9 +1,9 @@
 """Squares next to roads."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -35,6 +35,8 @@ class Square(element.Element):
         seed: Seed of houses, trees and the fountain.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("road",)
+
     type: Literal["square"] = "square"
     road: str = Field(examples=["main"])
     station_m: float = Field(60.0, ge=0)
@@ -45,11 +47,6 @@ class Square(element.Element):
     houses: Literal["old_town", "residential", "house", "commercial"] = "old_town"
     season: horizon.Season = "summer"
     seed: int = Field(0, ge=0, le=1_000_000)
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road."""
-        return element.name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the pavement, its objects and surroundings, and its sidewalks."""

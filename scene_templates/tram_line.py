@@ -1,8 +1,7 @@
 """Overhead lines of tramways along roads."""
 
 import math
-from collections.abc import Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -27,15 +26,12 @@ class TramLine(element.Element):
         seed: Seed of the poles.
     """
 
+    related: ClassVar[tuple[str, ...]] = ("road",)
+
     type: Literal["tram_line"] = "tram_line"
     road: str = Field(examples=["main"])
     span_m: float = Field(30.0, ge=10, le=60)
     seed: int = Field(0, ge=0, le=1_000_000)
-
-    @property
-    def relations(self) -> Mapping[str, str]:
-        """The road."""
-        return element.name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add wires and poles. Raises ConfigError if the road bends or has no track."""
