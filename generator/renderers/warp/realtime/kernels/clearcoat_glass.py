@@ -149,7 +149,7 @@ class SurfaceHit:
     entering: int
 
 
-@wp.func(**OUT_OF_LINE)
+@wp.func
 def trace_surface(world: records.World, origin: wp.vec3, d: wp.vec3):
     """The first surface along a ray."""
     first = closest_hit(world, origin, d, FARTHEST, records.HOLES)
@@ -253,7 +253,7 @@ def find_visible_lamps(
             )
 
 
-@wp.func(**OUT_OF_LINE)
+@wp.func
 def light_at_hit(
     world: records.World,
     probe: lattice_lighting.Probe,
@@ -498,7 +498,7 @@ def add_clearcoat(
     return layers
 
 
-@wp.func(**OUT_OF_LINE)
+@wp.func
 def layers_at(
     world: records.World,
     surface: int,
