@@ -14,6 +14,7 @@ from gen_data.core.scene import Body, Camera, Environment, Instance, Lidar, Ligh
 from gen_data.core.se3 import SE3, look_at
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene import material_packing
 from gen_data.renderers.warp.scene.device_assets import remove_fringe
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.kernels import records
@@ -200,11 +201,12 @@ def test_an_environment_shines_through_holes() -> None:
 
 
 def test_rays_look_for_holes_only_where_a_body_has_some() -> None:
-    """Panes are clear to shadow rays, and no other ray needs to look at them again."""
+    """Light passes panes as a whole, and of windows the panes: no other ray looks at them again."""
     glass = Material(transmission=1.0)
     meshes = {
         "floor": plane_mesh(1.0),
         "pane": plane_mesh(1.0, (glass,)),
+        "window": plane_mesh(1.0, (glass, Material())),
         "grate": plane_mesh(1.0, (GRATE,)),
     }
     cache = DeviceCache(FakeLibrary(meshes, {"grate": grate_texture()}), open_device("cpu"))
@@ -216,6 +218,16 @@ def test_rays_look_for_holes_only_where_a_body_has_some() -> None:
     holes, clear = int(records.HOLES), int(records.CLEAR)
     assert flags_of() == 0
     assert flags_of("floor") == 0
-    assert flags_of("floor", "pane") == clear
+    assert flags_of("floor", "pane") == 0
+    assert flags_of("pane", "window") == clear
     assert flags_of("grate", "floor") == holes
-    assert flags_of("pane", "grate") == holes | clear
+    assert flags_of("pane", "grate") == holes
+    assert flags_of("window", "grate") == holes | clear
+
+
+def test_light_passes_a_body_as_a_whole_if_all_of_its_faces_are_clear() -> None:
+    """Bodies of one clear slot, a clear and an opaque one, two clear ones with holes, and none."""
+    holes, clear, unshaded = int(records.HOLES), int(records.CLEAR), int(records.UNSHADED)
+    slots = np.array([clear, clear, 0, clear | holes, clear], np.int32)
+    flags = material_packing.cutout_bodies(slots, np.array([1, 2, 2, 0]))
+    assert flags.tolist() == [clear | unshaded, clear, clear | holes | unshaded, 0]

@@ -460,7 +460,7 @@ def _read_sensor(image: Float32, gains: Float32, sensor: ImageSensor, shot: Shot
     settings = exposure.gain, exposure.time_s, sensor, shot.noise_rng
     count = pipeline.reduction**2
     if count > 1.0 and sensor.pattern != "mono":
-        colors = expose_colors(image, *settings, count) * gains
+        colors = optics.scale_channels(expose_colors(image, *settings, count), gains)
         return np.asarray(np.minimum(colors, np.float32(pipeline.headroom)), np.float32)
     raw = expose(mosaic(image, sensor.pattern), *settings, count)
     raw = scale_filters(raw, sensor.pattern, gains)

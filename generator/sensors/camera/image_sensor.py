@@ -8,6 +8,7 @@ import math
 from functools import lru_cache
 from typing import Annotated, Literal
 
+import cv2
 import numpy as np
 from pydantic import Field
 
@@ -113,10 +114,10 @@ def expose_colors(
 ) -> Float32:
     """As ``expose``, of pixels that have photosites behind all filters: float32 [h, w, 3]."""
     colors = [
-        expose(light[..., k], gain, time_s, sensor, rng, share * photosites)
-        for k, share in enumerate(filter_shares(sensor.pattern))
+        expose(channel, gain, time_s, sensor, rng, share * photosites)
+        for channel, share in zip(cv2.split(light), filter_shares(sensor.pattern), strict=True)
     ]
-    return np.stack(colors, axis=-1)
+    return np.asarray(cv2.merge(colors), np.float32)
 
 
 def filter_shares(pattern: Pattern) -> list[float]:

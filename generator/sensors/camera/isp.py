@@ -165,11 +165,12 @@ def sharpen_to_bytes(display: Float32, amount: float, radius_px: float) -> NDArr
 
 def compress_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
     """Encode and decode an sRGB image as JPEG, uint8 [h, w, 3]; libjpeg's quality, 1 to 100."""
-    ok, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
+    ok, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert ok, "the JPEG encoder takes any RGB image"
     decoded = cv2.imdecode(data, cv2.IMREAD_COLOR)
     assert decoded is not None, "encoded bytes can be decoded"
-    return np.ascontiguousarray(decoded[..., ::-1], np.uint8)
+    return np.asarray(cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB), np.uint8)
 
 
 Tone = Literal["filmic", "knee", "log", "srgb", "linear"]

@@ -47,8 +47,11 @@ def fuse_exposures(image: Float32, scale: float, white: float, contrast: float) 
     # Noise of nearly black pixels is not enhanced.
     gain = np.minimum(shown / (level * np.float32(scale)), np.float32(2.0 * _LONG))
     pale = np.clip(level * np.float32(scale / (_PALE * white)) - np.float32(1.0), 0.0, 1.0)
-    image = image + (level[..., None] - image) * pale[..., None]
-    return tone_to_display(image * gain[..., None], scale, _CURVE, contrast=contrast)
+    # Merged first, as in optics.scale_pixels.
+    grey = cv2.merge([level, level, level])
+    image = image + (grey - image) * cv2.merge([pale, pale, pale])
+    image *= cv2.merge([gain, gain, gain])
+    return tone_to_display(image, scale, _CURVE, contrast=contrast)
 
 
 def _blend_scales(values: Float32, weights: Float32) -> Float32:

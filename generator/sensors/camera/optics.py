@@ -39,21 +39,36 @@ def defocus(image: Float32, radius_px: Float32) -> Float32:
     bleed into blurred background. After Kraus and Strengert, "Depth-of-field rendering by
     pyramidal image processing", Eurographics 2007.
     """
-    levels = np.asarray(_BLUR_LEVELS, np.float32)
-    level = np.searchsorted(0.5 * (levels[1:] + levels[:-1]), np.abs(radius_px)).astype(np.int8)
-    signed = np.where(radius_px < 0.0, -level, level)
+    signed = _signed_levels(radius_px)
+    if not signed.any():
+        return image
     # Colour and, last, cover.
-    out = np.zeros((*image.shape[:2], 4), np.float32)
-    for layer in range(len(levels) - 1, -len(levels), -1):
+    opaque: Float32 = cv2.merge([*cv2.split(image), np.ones(image.shape[:2], np.float32)])
+    out = np.zeros_like(opaque)
+    for layer in range(len(_BLUR_LEVELS) - 1, -len(_BLUR_LEVELS), -1):
         own = signed == layer
         if own.any():
-            radius = float(levels[abs(layer)])
+            radius = _BLUR_LEVELS[abs(layer)]
             place = _surroundings(own, math.ceil(radius))
-            _lay_over(out[place], _blurred_layer(image[place], own[place], radius))
+            mask = own[place].view(np.uint8)
+            if radius == 0.0:
+                cv2.copyTo(opaque[place], mask, out[place])
+            else:
+                _lay_over(out[place], _blurred_layer(opaque[place], mask, radius))
     red, green, blue, weight = cv2.split(out)
     weight = np.maximum(weight, np.float32(1e-4))
     blurred: Float32 = cv2.merge([red / weight, green / weight, blue / weight])
     return blurred
+
+
+def _signed_levels(radius_px: Float32) -> NDArray[np.int8]:
+    """Index of the nearest radius of ``_BLUR_LEVELS``, negative for negative radii."""
+    levels = np.asarray(_BLUR_LEVELS, np.float32)
+    size, level = np.abs(radius_px), np.zeros(radius_px.shape, np.int8)
+    for limit in 0.5 * (levels[1:] + levels[:-1]):
+        level += size > limit
+    np.negative(level, out=level, where=radius_px < 0.0)
+    return level
 
 
 def _surroundings(mask: NDArray[np.bool_], reach_px: int) -> tuple[slice, slice]:
@@ -65,14 +80,12 @@ def _surroundings(mask: NDArray[np.bool_], reach_px: int) -> tuple[slice, slice]
     return spans[0], spans[1]
 
 
-def _blurred_layer(image: Float32, own: NDArray[np.bool_], radius_px: float) -> Float32:
+def _blurred_layer(opaque: Float32, mask: NDArray[np.uint8], radius_px: float) -> Float32:
     """The pixels of a mask, blurred: colour times cover, and cover in [0, 1], [h, w, 4]."""
-    alpha = own.astype(np.float32)
-    layer: Float32 = cv2.merge([*(channel * alpha for channel in cv2.split(image)), alpha])
-    if radius_px > 0.0:
-        layer = cv2.filter2D(layer, -1, _disc(radius_px), borderType=cv2.BORDER_REPLICATE)
-        np.clip(layer[..., 3], 0.0, 1.0, out=layer[..., 3])
-    return layer
+    layer = cv2.copyTo(opaque, mask)
+    layer = cv2.filter2D(layer, -1, _disc(radius_px), borderType=cv2.BORDER_REPLICATE)
+    np.clip(layer[..., 3], 0.0, 1.0, out=layer[..., 3])
+    return np.asarray(layer, np.float32)
 
 
 def _lay_over(below: Float32, layer: Float32) -> None:
@@ -103,6 +116,13 @@ def scale_pixels(image: Float32, gain: Float32) -> Float32:
     scaled: Float32 = cv2.merge([gain, gain, gain])
     scaled *= image
     return scaled
+
+
+def scale_channels(image: Float32, gains: Float32) -> Float32:
+    """Multiply each channel of an image [h, w, 3] by one factor, of [3]."""
+    # As rows: numpy broadcasts over a last axis of three in a third of this speed.
+    rows = image.reshape(len(image), -1) * np.tile(gains, image.shape[1])
+    return np.asarray(rows.reshape(image.shape), np.float32)
 
 
 def natural_falloff(camera: intrinsics.Intrinsics, pupil_power: float) -> Float32:
@@ -228,7 +248,8 @@ def add_flare(image: Float32, share: float, white: float) -> Float32:
         # Shrinking averages the light of the pixels that it merges.
         ghost = cv2.warpAffine(beyond, shift, (width, height), flags=cv2.INTER_AREA)
         ghost = _gaussian(ghost, radius * width)
-        out += share * place * place * ghost * np.asarray(tint, np.float32)
+        ghost *= np.float32(share * place * place)
+        out += scale_channels(ghost, np.asarray(tint, np.float32))
     return np.asarray(out, np.float32)
 
 
@@ -347,5 +368,8 @@ def scatter(image: Float32) -> Float32:
 def _widen(image: Float32, width: int) -> Float32:
     """Enlarge the columns of an image by ``FACTOR`` to ``width``."""
     first, after, part = bilinear(width, FACTOR, image.shape[1])
-    weight = part[None, :, None]
-    return image.take(first, 1) * (1 - weight) + image.take(after, 1) * weight
+    shape = len(image), width, 3
+    # As rows, as in scale_channels.
+    left, right = (image.take(at, 1).reshape(len(image), -1) for at in (first, after))
+    weight = np.repeat(part, 3)
+    return np.asarray(left * (1 - weight) + right * weight, np.float32).reshape(shape)

@@ -147,10 +147,16 @@ def cutout_slots(
 
 
 def cutout_bodies(slots: NDArray[np.int32], counts: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Per body: the union of its slots' flags; ``counts`` are the bodies' numbers of materials."""
-    if not slots.any():
-        return np.zeros(len(counts), np.int32)
-    of_slots = np.repeat(np.arange(len(counts)), counts)
+    """Per body: the union of its slots' flags, and UNSHADED if all of them are CLEAR.
+
+    ``counts`` are the bodies' numbers of materials.
+    """
     bodies = np.zeros(len(counts), np.int32)
-    np.bitwise_or.at(bodies, of_slots, slots[: len(of_slots)])
+    if not slots.any():
+        return bodies
+    of_slots = np.repeat(np.arange(len(counts)), counts)
+    own = slots[: len(of_slots)]
+    np.bitwise_or.at(bodies, of_slots, own)
+    clear = np.bincount(of_slots, own & int(records.CLEAR) != 0, len(counts))
+    bodies[(clear == counts) & (counts > 0)] |= int(records.UNSHADED)
     return bodies

@@ -229,15 +229,17 @@ def _build_hierarchies(
     record: records.World, body_records: NDArray[np.void], device: wp.Device
 ) -> wp.Bvh | None:
     low, high = (np.ascontiguousarray(body_records[name]) for name in ("low_m", "high_m"))
-    cut = int(records.HOLES | records.CLEAR)
-    cutouts = np.flatnonzero(body_records["cutouts"] & cut).astype(np.int32)
+    flags = body_records["cutouts"] & int(records.HOLES | records.CLEAR)
+    # Shadow rays pass these bodies as a whole.
+    flags[(body_records["cutouts"] & int(records.UNSHADED)) != 0] &= int(records.HOLES)
+    cutouts = np.flatnonzero(flags).astype(np.int32)
     corners = (wp.array(of[cutouts], dtype=wp.vec3, device=device) for of in (low, high))
     cutout_hierarchy = wp.Bvh(*corners) if len(cutouts) else None
     record.boxes = wp.array(bvh.group_boxes(low, high), dtype=wp.float32, device=device)
     record.tree = wp.array(bvh.body_tree(low, high), dtype=wp.float32, device=device)
     record.cutouts = wp.array(cutouts, dtype=wp.int32, device=device)
     record.cutout_hierarchy = cutout_hierarchy.id if cutout_hierarchy else 0
-    record.cutout_flags = int(np.bitwise_or.reduce(body_records["cutouts"])) & cut
+    record.cutout_flags = int(np.bitwise_or.reduce(flags))
     return cutout_hierarchy
 
 

@@ -149,7 +149,7 @@ class SurfaceHit:
     entering: int
 
 
-@wp.func(**OUT_OF_LINE)
+@wp.func
 def trace_surface(world: records.World, origin: wp.vec3, d: wp.vec3):
     """The first surface along a ray."""
     first = closest_hit(world, origin, d, FARTHEST, records.HOLES)
@@ -218,7 +218,42 @@ def evaluate_with_maps(
     return material, maps
 
 
-@wp.func(**OUT_OF_LINE)
+@wp.func
+def find_visible_lamps(
+    world: records.World,
+    probe: lattice_lighting.Probe,
+    m: SurfaceHit,
+    origin: wp.vec3,
+    side: wp.vec3,
+    p: wp.vec3,
+    share: float,
+    k: int,
+):
+    """Visible fractions of the lamps that matter at the end of a ray, into ``probe.lit``.
+
+    Args:
+        origin: Of rays from there.
+        side: As for light_at.
+        share: As for light_at_hit.
+    """
+    parts = probe.parts
+    if share < SAMPLED_SHARE * float(probe.few.shape[0]):
+        parts = probe.centre
+    faint_lux = FAINT_SHARE * wp.pi * wp.max(ambient_light.ambient_irradiance(world, p, m.normal))
+    indoors = ambient_light.is_indoors(world, p)
+    for j in range(world.lamps.shape[0]):
+        # As in soft_shadows.weigh_lamps.
+        if indoors and world.lamps[j].kind == analytic_lights.SUN:
+            continue
+        faint_lux += FAINT_SHARE * wp.max(analytic_lights.beam_from(world.lamps[j], p).normal_lux)
+    for j in range(world.lamps.shape[0]):
+        if wp.max(analytic_lights.beam_from(world.lamps[j], p).normal_lux) > faint_lux:
+            probe.lit[j, k] = lattice_lighting.visible_lamp_fraction(
+                world, world.lamps[j], p, origin, m.normal, side, parts
+            )
+
+
+@wp.func
 def light_at_hit(
     world: records.World,
     probe: lattice_lighting.Probe,
@@ -240,29 +275,17 @@ def light_at_hit(
         sample: Number of the pixel's sample.
     """
     origin = lattice.ray_origin(world, m.hit, m.weight, p, d)
-    parts = probe.parts
-    disc = probe.disc
-    if share < SAMPLED_SHARE * float(probe.few.shape[0]):
-        parts = probe.centre
-        disc = probe.few[sample]
     surface = records.surface_index(world, m.hit)
     side = material_eval.sheet_normal(world, surface, m.hit, m.weight)
-    faint_lux = FAINT_SHARE * wp.pi * wp.max(ambient_light.ambient_irradiance(world, p, m.normal))
-    indoors = ambient_light.is_indoors(world, p)
+    # Scratch memory holds values of earlier rays: set every lamp.
     for j in range(world.lamps.shape[0]):
-        # As in soft_shadows.weigh_lamps.
-        if indoors and world.lamps[j].kind == analytic_lights.SUN:
-            continue
-        faint_lux += FAINT_SHARE * wp.max(analytic_lights.beam_from(world.lamps[j], p).normal_lux)
-    for j in range(world.lamps.shape[0]):
-        # Scratch memory holds values of earlier rays: set every lamp.
         probe.lit[j, k] = 1.0
-        bright = wp.max(analytic_lights.beam_from(world.lamps[j], p).normal_lux) > faint_lux
-        if clear < MOSTLY_CLEAR and bright:
-            probe.lit[j, k] = lattice_lighting.visible_lamp_fraction(
-                world, world.lamps[j], p, origin, m.normal, side, parts
-            )
+    if clear < MOSTLY_CLEAR:
+        find_visible_lamps(world, probe, m, origin, side, p, share, k)
     open_sky = occlusion
+    disc = probe.disc
+    if share < SAMPLED_SHARE * float(probe.few.shape[0]):
+        disc = probe.few[sample]
     if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
         open_sky *= lattice_lighting.visible_sky_fraction(
             world, m.hit[0], p, origin, m.normal, side, disc, probe.radius_m
@@ -475,7 +498,7 @@ def add_clearcoat(
     return layers
 
 
-@wp.func(**OUT_OF_LINE)
+@wp.func
 def layers_at(
     world: records.World,
     surface: int,

@@ -12,6 +12,7 @@ import warp as wp
 from gen_data.renderers.warp.scene.kernels.bvh_traverse import Found, any_in_mesh, first_in_mesh
 from gen_data.renderers.warp.scene.kernels.records import (
     CLEAR,
+    UNSHADED,
     World,
     face_vertices,
     floor_int,
@@ -134,6 +135,12 @@ def is_passable(world: World, b: int, face: int, weights: wp.vec3, through: int)
     return clear
 
 
+@wp.func
+def is_passed(world: World, b: int, through: int):
+    """Whether a ray that passes ``through`` passes all faces of a body."""
+    return (through & CLEAR) != 0 and (world.bodies[b].cutouts & UNSHADED) != 0
+
+
 @wp.struct
 class Strike:
     """Intersection of a ray with a mesh.
@@ -198,7 +205,9 @@ def closest_solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float
     """
     g = world.bodies[b].geometry
     strike = Strike()
-    if (world.bodies[b].cutouts & through) != 0:
+    if is_passed(world, b, through):
+        strike.face = -1
+    elif (world.bodies[b].cutouts & through) != 0:
         # Only bodies whose flags match need a test at every face.
         strike = first_opaque_hit(world, b, o, d, reach, through)
     else:
@@ -210,8 +219,10 @@ def closest_solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float
 def is_mesh_intersected(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
     """Whether a body blocks a ray; arguments as for closest_solid_hit."""
     g = world.bodies[b].geometry
-    # The cheaper any-hit query comes first: only hits on cut-outs need the test at every face.
-    hit = any_in_mesh(world.geometries[g].tree, o, d, reach)
+    hit = not is_passed(world, b, through)
+    if hit:
+        # The cheaper any-hit query comes first: only hits on cut-outs need the test at every face.
+        hit = any_in_mesh(world.geometries[g].tree, o, d, reach)
     if hit and (world.bodies[b].cutouts & through) != 0:
         hit = first_opaque_hit(world, b, o, d, reach, through).face >= 0
     return hit

@@ -14,6 +14,8 @@ HOLES = wp.constant(1)
 CLEAR = wp.constant(2)
 # Flag of bodies that move, which rays may pass as a whole.
 MOVES = wp.constant(4)
+# Cut-outs of a body that light passes everywhere: shadow rays need no test of its faces.
+UNSHADED = wp.constant(8)
 
 Coefficients = wp.types.vector(length=8, dtype=wp.float32)
 
@@ -87,7 +89,7 @@ class BodyRecord:
         B_mesh_world, t_mesh_world: World to mesh, scale included.
         low_m, high_m: Box in the world.
         cutouts: HOLES, CLEAR or both if rays may pass some of its faces; neither needs no test per
-            face. MOVES if it does not stay where it is.
+            face. MOVES if it does not stay where it is; UNSHADED if all of its faces are CLEAR.
     """
 
     geometry: int
@@ -441,7 +443,7 @@ class World:
     Attributes:
         boxes: The bodies' boxes in the world, see box_groups.
         tree: Hierarchy over the bodies' boxes, see gen_data.renderers.warp.scene.bvh.
-        cutouts: Numbers of the bodies with HOLES or CLEAR faces.
+        cutouts: Numbers of the bodies with HOLES, or with CLEAR faces among others.
         cutout_hierarchy: Warp's hierarchy over their boxes; 0 without any.
         cutout_flags: HOLES, CLEAR or both: the flags that any of them has.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
