@@ -19,6 +19,7 @@ sys.path.insert(0, str(ROOT))
 
 from docs.hooks.command_reference import command_page  # noqa: E402
 from docs.hooks.family_reference import family_page  # noqa: E402
+from docs.hooks.narrow_tables import with_breaks  # noqa: E402
 from docs.hooks.plugin_reference import first_comment, plugin_pages, yaml_block  # noqa: E402
 from docs.hooks.python_reference import python_page  # noqa: E402
 
@@ -30,7 +31,7 @@ PAGES = {
     "CHANGELOG.md": "project/changelog.md",
     "examples/README.md": "project/examples.md",
 }
-"""Pages of the site that are files outside of docs/, by path in the repository."""
+"""Pages of the site that are files outside docs/, by path in the repository."""
 
 SOURCE = "source"
 """Folder of the pages that show files of other types."""
@@ -73,7 +74,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Rewrite links to files outside of docs/, and show the configurations of the gallery."""
+    """Rewrite links to files outside docs/, and show the configurations of the gallery."""
     del config, files
     uri = page.file.src_uri
     if uri.startswith(("reference/", f"{SOURCE}/")):
@@ -84,6 +85,12 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     texts = [LINK.sub(lambda m: m[1] + _rewrite(m[2], origin, uri) + m[3], t) for t in parts]
     text = "".join(t + block for t, block in zip(texts, blocks, strict=True))
     return SECTION.sub(_with_configuration, text) if uri == "gallery.md" else text
+
+
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Let code in the cells of tables break between its words."""
+    del page, config, files
+    return with_breaks(html)
 
 
 def _is_document(file: File) -> bool:

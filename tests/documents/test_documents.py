@@ -1,6 +1,7 @@
 """Documents: configurations in them are valid, links and names of modules exist."""
 
 import importlib.util
+import itertools
 import re
 import shlex
 from pathlib import Path
@@ -117,6 +118,44 @@ def test_the_readme_is_short() -> None:
     assert len(lines) <= 80
     for line in lines:
         assert not line.startswith("|") or len(links.sub("", line)) <= 160, line
+
+
+def tables(page: Path) -> list[list[list[str]]]:
+    """Cells of a page's tables by row, without targets of links; code has no tables."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    return [
+        [
+            re.split(r"(?<!\\)\|", line.strip())[1:-1]
+            for line in table.splitlines()
+            if "---" not in line
+        ]
+        for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
+    ]
+
+
+def narrowest_px(table: list[list[str]]) -> float:
+    """Width at which no word of a table is cut: in site.css, 6.8 px a letter and 11 px a column."""
+    words = [[max(map(len, WORD_END.split(cell))) for cell in row] for row in table]
+    longest = [max(column) for column in itertools.zip_longest(*words, fillvalue=0)]
+    return 6.8 * sum(longest) + 11.0 * len(longest)
+
+
+WORD_END = re.compile(r"[\s`*]+|(?<=[-_/.,:=])")
+"""Where lines may break; in code by docs/hooks/narrow_tables.py."""
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in [*PAGES, *TUTORIALS] if page not in OLD_NAMES],
+    ids=lambda page: page.name,
+)  # fmt: skip
+def test_tables_are_readable_on_a_telephone(page: Path) -> None:
+    """On 400 px, of which margins take 32; tables with more than five columns scroll."""
+    for table in tables(page):
+        assert max(len(re.sub("[`*]", "", cell).strip()) for row in table for cell in row) <= 160, (
+            table[0]
+        )
+        assert len(table[0]) > 5 or narrowest_px(table) <= 368.0, table[0]
 
 
 def commands_of(page: Path) -> list[str]:

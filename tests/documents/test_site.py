@@ -13,6 +13,7 @@ from docs import pictures
 from docs.hooks import plugin_reference
 from docs.hooks.command_reference import command_page
 from docs.hooks.family_reference import family_section
+from docs.hooks.narrow_tables import with_breaks
 from gen_data import configs, scene_templates
 from gen_data.assemble.plugin_tables import TABLES
 from gen_data.assets.families import own_families
@@ -63,6 +64,15 @@ def test_tables_of_fields_become_blocks_on_narrow_screens(kind: str) -> None:
     page = page_of(kind)
 
     assert 1 <= page.count("| field |") == page.count('<div class="fields" markdown>\n\n| field |')
+
+
+def test_code_in_cells_may_break_between_its_words_and_nowhere_else() -> None:
+    """Tags, entities, other text of cells, and code outside of tables are unchanged."""
+    page = (
+        "<p><code>a/b</code></p><td class='x/y'>c/d <a href='e.f'><code>g_h/&lt;i</code></a></td>"
+    )
+
+    assert with_breaks(page) == page.replace("g_h/&lt;i", "g_<wbr>h/<wbr>&lt;i")
 
 
 @pytest.mark.parametrize("kind", list(TABLES))
