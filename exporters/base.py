@@ -1,6 +1,7 @@
 """Base class of exporters, with defaults for the optional members of ``Exporter``."""
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import ClassVar, TypeVar, get_args
 
@@ -17,6 +18,7 @@ ANY_FORMAT: frozenset[str] = frozenset(get_args(capture.ImageFormat))
 
 E = TypeVar("E", bound="ExporterBase")
 A = TypeVar("A", bound="AssetExporter")
+W = TypeVar("W", bound="WrappedExporter")
 
 
 class Rectify(Strict):
@@ -124,6 +126,40 @@ class AssetExporter(ExporterBase):
         """The library of ``with_assets``."""
         assert self._assets is not None, "call with_assets first"
         return self._assets
+
+
+@dataclass(frozen=True)
+class WrappedExporter:
+    """An exporter that shows another one a data set with changes; other members are its own.
+
+    Attributes:
+        exporter: The other one.
+    """
+
+    exporter: interfaces.Exporter
+
+    @property
+    def type(self) -> str:
+        """Name of the exporter."""
+        return self.exporter.type
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it reads."""
+        return self.exporter.needs
+
+    @property
+    def has_own_classes(self) -> bool:
+        """Whether the format prescribes its classes."""
+        return self.exporter.has_own_classes
+
+    def check(self, info: interfaces.DatasetInfo) -> None:
+        """Refuse as the exporter does."""
+        self.exporter.check(info)
+
+    def with_assets(self: W, assets: interfaces.AssetLibrary) -> W:
+        """Return the exporter with a library."""
+        return replace(self, exporter=self.exporter.with_assets(assets))
 
 
 def check_classes(exporter: str, info: interfaces.DatasetInfo, known: Collection[str]) -> None:

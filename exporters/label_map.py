@@ -19,9 +19,10 @@ from pydantic import Field, field_validator, model_validator
 from gen_data.config.base_model import Strict
 from gen_data.core import capture, path_names
 from gen_data.core.errors import ConfigError, ConfigWarning, did_you_mean, list_names
-from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.core.scene import Instance, Scene
+from gen_data.exporters.base import WrappedExporter
 
 PublicList = Literal["coco80", "kitti", "nuscenes", "cityscapes", "nyu40", "ade20k"]
 Sources = tuple[str, ...]
@@ -185,34 +186,19 @@ def public_classes(name: str) -> Mapping[str, Sources | None]:
 
 
 @dataclass(frozen=True)
-class MappedExporter:
+class MappedExporter(WrappedExporter):
     """An exporter that sees a data set through a label map."""
 
-    exporter: Exporter
     label_map: LabelMap
-
-    @property
-    def type(self) -> str:
-        """Name of the exporter."""
-        return self.exporter.type
 
     @property
     def needs(self) -> frozenset[str]:
         """Annotators of the exporter and of the limits."""
         return self.exporter.needs | self.label_map.needs
 
-    @property
-    def has_own_classes(self) -> bool:
-        """As the exporter."""
-        return self.exporter.has_own_classes
-
     def check(self, info: DatasetInfo) -> None:
         """Refuse as the exporter does."""
         self.exporter.check(self._mapping(info).info)
-
-    def with_assets(self, assets: AssetLibrary) -> "MappedExporter":
-        """The exporter with access to the library."""
-        return replace(self, exporter=self.exporter.with_assets(assets))
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the mapped labels of one shard."""

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gen_data.core.capture import Capture
-from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter, reading_paths
+from gen_data.core.interfaces import DatasetInfo, Exporter, reading_paths
 from gen_data.core.reported import copies
 from gen_data.core.sample import Sample
+from gen_data.exporters.base import WrappedExporter
 from gen_data.exporters.image_files import link_or_copy
 
 FOLDER = "_delivered"
@@ -21,33 +22,8 @@ FOLDER = "_delivered"
 
 
 @dataclass(frozen=True)
-class DeliveredExporter:
+class DeliveredExporter(WrappedExporter):
     """An exporter that sees the readings that arrive."""
-
-    exporter: Exporter
-
-    @property
-    def type(self) -> str:
-        """Name of the exporter."""
-        return self.exporter.type
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Annotators of the exporter."""
-        return self.exporter.needs
-
-    @property
-    def has_own_classes(self) -> bool:
-        """As the exporter."""
-        return self.exporter.has_own_classes
-
-    def check(self, info: DatasetInfo) -> None:
-        """Raise the exporter's refusals."""
-        self.exporter.check(info)
-
-    def with_assets(self, assets: AssetLibrary) -> "DeliveredExporter":
-        """The exporter with access to the library."""
-        return DeliveredExporter(self.exporter.with_assets(assets))
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Link the files that arrive, and write the labels of one shard."""

@@ -15,12 +15,13 @@ from typing import TypeVar
 from gen_data.annotations.annotate import Thresholds
 from gen_data.core.capture import Capture, Channel
 from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter, Modality, reading_paths
+from gen_data.core.interfaces import DatasetInfo, Exporter, Modality, reading_paths
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Camera, Device, Lidar, Scene
 from gen_data.exporters.base import (
     ExporterBase,
     Rectify,
+    WrappedExporter,
     check_delivery,
     check_image_formats,
     select_names,
@@ -40,7 +41,7 @@ FOLDER = "_rectified"
 
 
 @dataclass(frozen=True)
-class ExporterView:
+class ExporterView(WrappedExporter):
     """An exporter that sees some sensors of a data set, with bent lenses rectified.
 
     Attributes:
@@ -49,26 +50,15 @@ class ExporterView:
         thresholds: For listing objects of rectified images.
     """
 
-    exporter: Exporter
     cameras: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
     rectify: Rectify | None = None
     thresholds: Thresholds = field(default_factory=Thresholds)
 
     @property
-    def type(self) -> str:
-        """Name of the exporter."""
-        return self.exporter.type
-
-    @property
     def needs(self) -> frozenset[str]:
         """Annotators of the exporter; rectified labels follow from masks."""
         return self.exporter.needs | ({"instance_masks"} if self.rectify else set())
-
-    @property
-    def has_own_classes(self) -> bool:
-        """As the exporter."""
-        return self.exporter.has_own_classes
 
     @property
     def image_formats(self) -> frozenset[str]:
@@ -110,10 +100,6 @@ class ExporterView:
         """Refuse lenses that no pinhole can show, before anything is generated."""
         for camera in scene.cameras:
             self._camera(camera)
-
-    def with_assets(self, assets: AssetLibrary) -> "ExporterView":
-        """The exporter with access to the library."""
-        return replace(self, exporter=self.exporter.with_assets(assets))
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write rectified images, and the labels of one shard as the exporter sees them."""
