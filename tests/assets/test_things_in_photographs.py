@@ -1,4 +1,4 @@
-"""Bottles, prints and supports of things as photographs show them."""
+"""Bottles, prints and supports of objects as in photographs."""
 
 from collections.abc import Callable
 
@@ -70,7 +70,7 @@ def test_prints_of_mugs_show_the_same_picture_on_both_sides_of_the_handle() -> N
 
 
 def test_look_alikes_have_no_category_of_what_they_resemble() -> None:
-    """They are on no list of household objects, so that only close-ups have them."""
+    """They are on no list of household objects: only close-ups have them."""
     for name in LIKE:
         family = FAMILIES[name]
         assert family.category not in WANTED
