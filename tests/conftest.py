@@ -1,6 +1,6 @@
-"""What holds for every test.
+"""Fixtures and rules for every test.
 
-With ``GEN_DATA_CI`` set, a skipped test is a failed one: what skips everywhere tests nothing.
+With ``GEN_DATA_CI`` set, a skipped test fails: a test that is skipped everywhere tests nothing.
 """
 
 import atexit
@@ -19,8 +19,8 @@ import pytest
 from tests.pybullet_files import provide_pybullet_data
 from tests.wheels import HAS_RERUN
 
-# Packs that happen to be installed on this machine must not change what tests see; processes that
-# tests start inherit it. Set before anything asks, hence not in a fixture.
+# Packs installed on this machine must not change results; processes that tests start inherit it.
+# Set before the first use, hence not in a fixture.
 os.environ["GEN_DATA_ASSETS"] = tempfile.mkdtemp(prefix="gen-data-no-packs-")
 atexit.register(shutil.rmtree, os.environ["GEN_DATA_ASSETS"], ignore_errors=True)
 
@@ -44,7 +44,7 @@ SKIPS_ALLOWED_IN_CI = (
     "no folder with the catalogue pack",  # which only Debian's registry has
     "numpy's type hints are older and vaguer on Python 3.10",  # CI has 3.11
 )
-"""Reasons that depend on where CI runs, and not on what ``.ci/run`` installs."""
+"""Reasons that depend on the machine of CI, and not on packages installed by ``.ci/run``."""
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -73,7 +73,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(scope="session")
 def library() -> Any:
-    """What comes with the package; imported when asked for, as it looks for packs."""
+    """Assets of the package; imported on request, because it looks for packs."""
     return importlib.import_module("tests.libraries").library()
 
 
@@ -101,9 +101,9 @@ def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
-    """Limit what a hostile file may take: 10 s of processor time, and 1 GB in this process.
+    """Limit the resources of a hostile file: 10 s of processor time, and 1 GB in this process.
 
-    The process that parses files has limits of its own (``generator/assets/sandbox.py``).
+    The process that parses files has separate limits (``generator/assets/sandbox.py``).
     """
     if item.get_closest_marker("hostile") is None:
         yield

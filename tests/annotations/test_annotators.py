@@ -123,7 +123,7 @@ def test_masks_fill_their_boxes(truths: tuple[ObjectTruth, ...]) -> None:
 
 
 def test_an_amodal_mask_is_tight_after_clipping() -> None:
-    """An L whose foot is outside the image: what is left is narrower than the clip."""
+    """An L whose foot is outside the image: the rest is narrower than the clip."""
     scene, reading = scene_and_reading()
     outline = np.zeros((8, 10), bool)
     outline[:, 4:] = True
@@ -177,7 +177,7 @@ def test_boxes_in_both_frames_are_the_instances_bounds(truths: tuple[ObjectTruth
 
 
 def test_boxes_of_space_leave_out_what_is_beside_the_body() -> None:
-    """In every frame, also of samples as a whole; the centre moves by half of what is missing."""
+    """In every frame, also of samples as a whole; the centre moves by half of the missing part."""
     scene, reading = scene_and_reading()
     arm = replace(ARM, body_bounds_m=((-0.1, -0.2, 0.0), (0.2, 0.1, 1.0)))
     scene = replace(scene, instances=(MUG, arm))
@@ -241,7 +241,7 @@ def test_hidden_and_absent_instances_are_listed_only_on_request() -> None:
 
 
 def test_a_fraction_that_is_not_measured_cannot_be_a_threshold() -> None:
-    """The message says what to add."""
+    """The message states the missing annotation."""
     with pytest.raises(ConfigError, match="add 'visibility' to annotations"):
         annotate_objects(
             *scene_and_reading(), annotators("poses"), Thresholds(min_visible_fraction=0.1)

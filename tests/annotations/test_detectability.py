@@ -71,7 +71,7 @@ def test_clutter_around_an_object_counts_as_noise() -> None:
 
 
 def test_filters_of_a_mosaic_are_compared_with_their_own_kind() -> None:
-    """A colour filter array before grey is no contrast."""
+    """A colour filter array before grey does not count as contrast."""
     pattern = np.tile(np.array([[0.2, 0.5], [0.5, 0.1]], np.float32), (H // 2, W // 2))[..., None]
     noise = with_ball(0.02, 0.02)
     assert index(pattern.copy(), noise) == pytest.approx(0.0, abs=2e-3)

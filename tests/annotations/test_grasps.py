@@ -20,7 +20,7 @@ SETTINGS = Grasps(tried=48, most=4)
 
 @cache
 def settled() -> tuple[Scene, EgoTruth, dict[int, trimesh.Trimesh]]:
-    """A table with things: the scene, its grasps, and the meshes of all bodies by instance."""
+    """A table with objects: the scene, its grasps, and the meshes of all bodies by instance."""
     small = ("sensors[0].size_px=[64, 48]", "exporters=[]", "annotations=[]")
     with open_pipeline(load_config("tabletop", overrides=small), frozenset()) as made:
         scene = made.sample(5).scene

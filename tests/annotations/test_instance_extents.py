@@ -13,7 +13,7 @@ from gen_data.core.boxes import BoxPx, tight_box
 def test_extents_are_count_and_box_of_every_id(
     height: int, width: int, largest: int, seed: int
 ) -> None:
-    """Small images, so that runs often end and begin at row ends; ids may be missing."""
+    """Small images, in which runs often end and begin at row ends; ids may be missing."""
     ids = np.random.default_rng(seed).integers(0, largest + 1, (height, width), dtype=np.uint16)
 
     found = find_extents(ids)
@@ -24,7 +24,7 @@ def test_extents_are_count_and_box_of_every_id(
 
 
 def test_extents_end_with_rows_reach_the_largest_id_and_leave_out_nothing() -> None:
-    """Ids of the last pixel of row 0 and the first of row 1 are no neighbours; 0 is no id."""
+    """Ids of the last pixel of row 0 and the first of row 1 are not neighbours; 0 is not an id."""
     ids = np.array([[0, 0, 7], [7, 0, 0]], np.uint16)
 
     assert find_extents(ids) == {7: Extent(2, BoxPx(0, 0, 3, 2))}

@@ -113,7 +113,7 @@ def test_a_point_in_front_of_what_covers_the_panel_counts_as_silhouette() -> Non
 def test_a_ray_that_misses_the_silhouette_by_a_pixel_is_visible(
     place_m: tuple[float, float, float], expected: int
 ) -> None:
-    """One pixel beside the panel's left and upper edge, and two."""
+    """One pixel off the panel's left and upper edge, and two."""
     assert visibility(*place_m) == expected
 
 

@@ -33,7 +33,7 @@ WORDS = ("caption", "relation", "expression", "counting", "existence", "spatial"
 
 @dataclass(frozen=True)
 class Picture:
-    """What a reader sees: ids, their names and centres; and the relations in space."""
+    """Input of a reader: ids, their names and centres; and the relations in space."""
 
     truth: ImageTruth
     names: dict[int, str]
@@ -97,7 +97,7 @@ each = pytest.mark.parametrize(("config", "index"), cases(PICTURES, PICTURES[:1]
 
 
 def resolve(seen: Picture, text: str) -> set[int]:
-    """Things that an expression may mean, by its words alone."""
+    """Objects that an expression may mean, by its words alone."""
     match = re.fullmatch(
         r"the (?:(leftmost|rightmost|largest|smallest|red|green|blue|yellow|orange|purple|pink"
         r"|brown|white|black|gray) )?(.+?)"
@@ -130,7 +130,7 @@ def resolve(seen: Picture, text: str) -> set[int]:
 @pytest.mark.slow
 @each
 def test_an_expression_refers_to_its_thing_and_no_other(config: str, index: int) -> None:
-    """A reader who knows all visible things, also barely visible ones, finds exactly that one."""
+    """A reader who sees all visible objects, also barely visible ones, finds exactly one."""
     seen = picture(config, index)
     assert seen.said("expression")
     for said in seen.said("expression"):
@@ -140,7 +140,7 @@ def test_an_expression_refers_to_its_thing_and_no_other(config: str, index: int)
 @pytest.mark.slow
 @each
 def test_nothing_is_said_about_what_cannot_be_seen(config: str, index: int) -> None:
-    """Every thing that an utterance is about has at least the pixels of the threshold."""
+    """Every object of an utterance has at least the pixels of the threshold."""
     seen = picture(config, index)
     for said in seen.truth.utterances or ():
         assert all(seen.pixels.get(n, 0) >= 256 for n in said.instances), said
@@ -177,7 +177,7 @@ def test_existence_has_both_answers_and_they_are_true(config: str, index: int) -
 
 @each
 def test_answers_about_places_follow_from_relations(config: str, index: int) -> None:
-    """Names resolve to one thing each; sides agree with columns, places with contacts."""
+    """Names resolve to one object each; sides agree with columns, places with contacts."""
     seen = picture(config, index)
     for said in seen.said("spatial"):
         if match := re.fullmatch(r"Is (the .+) to the (left|right) of (the .+)\?", said.text):
@@ -203,7 +203,7 @@ def test_answers_about_places_follow_from_relations(config: str, index: int) -> 
 
 @pytest.mark.slow
 def test_sentences_state_relations() -> None:
-    """Of a scene in which a hand holds a thing."""
+    """Captions of a scene in which a hand holds an object."""
     seen = picture("tabletop", 5)
     texts = {said.text for said in seen.said("relation")}
     table = next(n for n, name in seen.names.items() if name == "table")
@@ -243,7 +243,7 @@ def test_a_barely_visible_thing_takes_the_name_from_the_others() -> None:
 
 
 def test_kin_are_confused_and_are_not_asked_for() -> None:
-    """A cup beside a mug may be called a mug; where there is a mug, nobody asks for a cup."""
+    """A cup next to a mug may be called a mug; where there is a mug, no question names a cup."""
     both = view(thing(1, "mug", 0, 10), thing(2, "cup", 20, 30))
 
     assert "cup" in kin("mug")
@@ -255,7 +255,7 @@ def test_kin_are_confused_and_are_not_asked_for() -> None:
 
 
 def test_overlapping_boxes_have_no_leftmost_thing() -> None:
-    """One must be beside all others."""
+    """One must be next to all others."""
     assert texts(view(thing(1, "mug", 0, 10), thing(2, "mug", 9, 30)), "expression") == []
     assert texts(view(thing(1, "mug", 0, 10), thing(2, "mug", 10, 30)), "expression") == [
         "the leftmost mug",
@@ -275,7 +275,7 @@ def test_a_side_of_a_landmark_tells_things_apart_only_if_no_other_reaches_there(
 
 
 def test_a_colour_is_said_only_where_no_candidate_may_have_it() -> None:
-    """Of a red and a blue mug; not beside one whose colour is doubtful."""
+    """For a red and a blue mug; not next to one whose colour is doubtful."""
     red, blue = thing(1, "mug", 0, 10, color="red"), thing(2, "mug", 5, 30, color="blue")
 
     assert texts(view(red, blue), "expression") == ["the red mug", "the blue mug"]

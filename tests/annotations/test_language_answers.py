@@ -64,7 +64,7 @@ VAR_PX = 1.0 / 12.0
 
 @dataclass(frozen=True)
 class Frame:
-    """One image of a data set, and what the files state about it."""
+    """One image of a data set, and its labels in the files."""
 
     shard: Path
     sensor: str
@@ -469,7 +469,7 @@ def frames(folder: Path) -> Iterator[Frame]:
         texts = ((shard / f"{name}.jsonl").read_text("utf-8") for name in ("labels", "scenes"))
         for label, record in zip(*(text.splitlines() for text in texts), strict=True):
             plain, kept = json.loads(label), json.loads(record)
-            # A line has what differs from the first sample of its scene.
+            # A line has the differences from the first sample of its scene.
             scene = scenes.get(kept["base"], {}) | kept["scene"]
             scenes[kept["index"]] = scene
             for sensor in plain["truth"]:

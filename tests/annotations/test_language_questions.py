@@ -164,7 +164,7 @@ def greet(_: View) -> Iterator[Utterance]:
 
 
 def test_packages_add_kinds_by_an_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Theirs follow, and have names of their own in ``kinds``."""
+    """Third-party questions follow, and have their own names in ``kinds``."""
     entry = EntryPoint("greeting", f"{__name__}:greet", "gen_data.question")
     monkeypatch.setattr(plugins, "third_party", lambda kind: {"greeting": entry})
 

@@ -1,4 +1,4 @@
-"""Voxels of solids, and what cameras and scanners observe of them."""
+"""Voxels of solids, and the ones that cameras and scanners observe."""
 
 import math
 from dataclasses import dataclass
@@ -231,7 +231,7 @@ def test_walls_and_a_roof_hide_the_inside_of_a_house_from_all_sides() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("camera", ["image_02", "image_03"])
 def test_a_camera_observes_the_free_voxels_that_nothing_hides(camera: str) -> None:
-    """Rays from the camera to the centres of voxels, without those beside an edge."""
+    """Rays from the camera to the centres of voxels, except voxels at an edge."""
     made = world()
     reading = made.sample.capture.readings[camera]
     grid, pose = made.grid, reading.camera.T_world_camera

@@ -66,7 +66,7 @@ def test_crossed_rods_touch_at_a_point() -> None:
 
 
 def test_side_by_side_is_not_above() -> None:
-    """A taller box beside a lower one touches its side: no contact carries it."""
+    """A taller box next to a lower one touches its side: no contact carries it."""
     low, tall = box((0.1, 0.1, 0.1), (0, 0, 0.05)), box((0.1, 0.1, 0.102), (0.101, 0, 0.051))
     contacts = find_contacts(tall, low, 0.002)
 
@@ -151,7 +151,7 @@ def test_things_touch_what_supports_them_from_above(config: str, index: int, eng
         gaps = []
         for source, target, down in ((one, other, -1.0), (other, one, 1.0)):
             points = np.concatenate([source.sample(60_000, seed=0), source.vertices])
-            # From a little behind the surface: resting things overlap by rounding.
+            # From a little behind the surface: resting objects overlap by rounding.
             points[:, 2] -= down * 0.003
             hits = RayCaster((target.vertices, target.faces)).cast(points, (0.0, 0.0, down))
             gaps.append(hits.distance.min() - 0.003)
@@ -160,7 +160,7 @@ def test_things_touch_what_supports_them_from_above(config: str, index: int, eng
 
 @each
 def test_all_at_rest_is_supported_down_to_furniture(config: str, index: int, engine: str) -> None:
-    """Physics stability: nothing floats. Chains of supports end at what physics cannot move."""
+    """Physics stability: nothing floats. Chains of supports end at static bodies."""
     world = settled(config, index, engine)
     below: dict[int, set[int]] = {}
     for subject, support in world.pairs("supported_by") | world.pairs("held_by"):
@@ -185,7 +185,7 @@ def test_no_two_things_carry_each_other(config: str, index: int, engine: str) ->
 @pytest.mark.slow
 @each
 def test_near_things_are_nearer_than_half_the_smaller(config: str, index: int, engine: str) -> None:
-    """And all others are farther; things that touch, hold or contain each other are left out."""
+    """And all others are farther; pairs that touch, hold or contain each other are left out."""
     world = settled(config, index, engine)
     annotated = sorted(i.instance_id for i in world.scene.instances if i.annotated)
     related = {frozenset((r.subject, r.object)) for r in world.relations if r.predicate != "near"}
@@ -219,7 +219,7 @@ def test_parts_in_a_bin_are_inside_it_and_things_on_a_table_are_not() -> None:
 
 @pytest.mark.slow
 def test_what_the_hand_holds_is_held_and_on_nothing() -> None:
-    """The arm's goal of this scene is to hold a thing; its pads touch it."""
+    """The arm's goal in this scene is to hold an object; its pads touch it."""
     world = settled("tabletop", 0)
     (arm,) = world.scene.articulations
     assert arm.goal is not None and arm.goal.kind == "hold"
@@ -231,7 +231,7 @@ def test_what_the_hand_holds_is_held_and_on_nothing() -> None:
 
 @slow
 def test_furniture_stands_on_the_floor_and_things_on_furniture_below_them() -> None:
-    """In a furnished room: no wall, ceiling or floor is carried, nothing by what is beside it."""
+    """In a furnished room: no wall, ceiling or floor is carried, nothing by its neighbour."""
     world = settled("rooms", 31)
     category = {i.instance_id: i.category for i in world.scene.instances}
     low_m = {k: float(mesh.vertices[:, 2].min()) for k, mesh in world.meshes.items()}
@@ -253,7 +253,7 @@ def test_furniture_stands_on_the_floor_and_things_on_furniture_below_them() -> N
 
 @each
 def test_views_follow_from_boxes_and_depths(config: str, index: int, engine: str) -> None:
-    """Left and right by columns; before and behind, for things in the same columns, by distance."""
+    """Left and right by columns; before and behind, for shared columns, by distance."""
     world = settled(config, index, engine)
     boxes = {t.instance.instance_id: t.box for t in world.image.objects if t.box}
     stated = {(r.subject, r.predicate, r.object) for r in world.image.relations or ()}
@@ -274,7 +274,7 @@ def test_views_follow_from_boxes_and_depths(config: str, index: int, engine: str
 
 @pytest.mark.slow
 def test_images_tell_only_of_what_they_show() -> None:
-    """A thing that no pixel shows is in the scene's graph and in no image's."""
+    """An object without visible pixels is in the scene's graph and in no image's."""
     world = settled("bin_picking", 0)
     shown = {t.instance.instance_id for t in world.image.objects}
     furniture = {i.instance_id for i in world.scene.instances if not i.annotated}

@@ -58,7 +58,7 @@ def test_a_keypoint_is_where_its_row_shows_it(v_px: float, readout_s: float) -> 
 
 
 def test_exposure_alone_moves_no_keypoint() -> None:
-    """Labels are those of its middle."""
+    """Labels refer to its middle."""
     assert seen(10.0, Shutter(exposure_s=0.1)) == seen(10.0, INSTANT)
 
 

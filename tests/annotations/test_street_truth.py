@@ -109,7 +109,7 @@ def test_borders_are_where_the_ground_is_seen_under_them() -> None:
 
 
 def test_points_behind_a_car_are_listed_and_hidden() -> None:
-    """The car ahead hides what its box covers, and nothing before it or beside it."""
+    """The car ahead hides the area behind its box, and nothing before it or at its sides."""
     scene = street()
     reading = seen(scene)
     truth = Lanes(step_px=1.0).annotate_image(
@@ -121,7 +121,7 @@ def test_points_behind_a_car_are_listed_and_hidden() -> None:
         for (u, v), visible in zip(border.points_px, border.visible, strict=True):
             covered = bool(reading.channels[Channel.INSTANCE][int(v), int(u)])
             depth = EYE_M / ((v - LENS.cy_px) / LENS.fy_px)
-            # What is seen of the car just above the ground hides nothing.
+            # The part of the car just above the ground hides nothing.
             assert visible is not covered or (visible and 16.0 < depth < 21.0)
             hidden += not visible
     assert hidden > 5
@@ -242,7 +242,7 @@ def test_boxes_are_given_in_the_frames_of_ego_and_scanner_at_their_instants() ->
 
 
 def test_motion_is_told_along_the_axes_of_three_frames() -> None:
-    """5 m/s along +X; the ego faces +Y, so that is to its right, and so to its camera's."""
+    """5 m/s along +X; the ego faces +Y: the object moves to its right, and its camera's."""
     scene = street(math.radians(90.0))
     car = scene.instances[0].T_world_instance
     track = Trajectory("car/0", 1.0, (car, SE3((5.0, 0.0, 0.0)) @ car, SE3((10.0, 0.0, 0.0)) @ car))
@@ -282,7 +282,7 @@ def test_the_ego_turns_about_its_body_and_not_about_its_rig() -> None:
 
 
 def test_annotators_do_what_their_methods_say() -> None:
-    """Objects, images, samples: none gets what is another's; where none asks, nothing is made."""
+    """Objects, images, samples: each gets only its own annotations; without a request, none."""
     scene = street()
     annotators = [Motion(), Lanes(), Boxes3d()]
     image = annotate_reading(scene, seen(scene), annotators, Thresholds(), library())

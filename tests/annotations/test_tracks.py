@@ -226,7 +226,7 @@ def test_behind_a_pane_points_are_seen_through_it_and_none_is_on_it() -> None:
 
 
 def test_points_beside_the_image_are_outside_and_those_at_the_back_behind() -> None:
-    """The camera turns by a quarter in a step: x / z of the points says where they are."""
+    """The camera turns by a quarter in a step: x / z of the points gives their position."""
     scene = world(WALL, camera_turn_rad_s=7.0)
     for tracks in followed(scene, steps=4):
         seen = camera(tracks)
@@ -252,7 +252,7 @@ def test_a_wide_lens_sees_points_where_its_model_puts_them() -> None:
 
 
 def test_rectified_points_are_where_the_pinhole_has_them() -> None:
-    """K p / z of the points in the camera's frame; points beside the new image are outside."""
+    """K p / z of the points in the camera's frame; points off the new image are outside."""
     lens = replace(LENS, lens=Lens("kannala_brandt", (0.0, 0.0, 0.0, 0.0), 1.5))
     (tracks,) = followed(world(WALL, lens=lens), steps=1)
     bent = rectification(lens, Rectify(hfov_deg=40.0))

@@ -36,7 +36,7 @@ def clear_places(rng: np.random.Generator, low: Voxel, high: Voxel, count: int) 
 def test_the_last_point_in_a_voxel_decides_and_none_in_the_box_is_missed(
     count: int, slots: int
 ) -> None:
-    """Most blocks are beside the box, many reach across its faces."""
+    """Most blocks are outside the box, many reach across its faces."""
     rng = np.random.default_rng(count)
     places = clear_places(rng, (-60, -3, -3), (60, 19, 15), count)
     places = places[np.argsort(np.floor(places[:, 0]), kind="stable")]
@@ -99,7 +99,7 @@ def chords(start: Array, end: Array) -> Array:
 
 
 def test_a_scanner_observes_the_voxels_that_lines_pass_for_half_a_voxel() -> None:
-    """Lines one by one; all together observe the union. The scanner is beside the box."""
+    """Lines one by one; all together observe the union. The scanner is outside the box."""
     rng = np.random.default_rng(2)
     pose = BOX.T_world_frame @ SE3((-6.0, 0.3, 0.4), SE3.about_z(0.5).quaternion_wxyz)
     ends = rng.uniform((-4, -4, -3), (5, 4, 3), (60, 3))

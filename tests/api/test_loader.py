@@ -1,4 +1,4 @@
-"""Loading for training: the order of samples, and what it does not depend on."""
+"""Loading for training: the order of samples, and its independence."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -48,7 +48,7 @@ def flat(batches: Iterator[list[int]] | gen_data.Loader[int]) -> list[int]:
 
 
 def test_every_epoch_has_every_sample_once_in_an_order_that_the_seed_repeats() -> None:
-    """In batches of the size, the last one smaller; as many as ``len`` says."""
+    """In batches of the size, the last one smaller; as many as ``len`` states."""
     for shuffle in (False, True):
         batches = list(loader(batch_size=4, shuffle=shuffle))
         assert sorted(flat(iter(batches))) == list(range(31))

@@ -88,7 +88,7 @@ def test_slices_have_a_length_and_what_is_not_there_is_said(data: gen_data.Datas
     with pytest.raises(gen_data.SampleIndexError, match="index 5 is out of range for 5 samples"):
         _ = data[5]
     assert issubclass(gen_data.SampleIndexError, IndexError)
-    # Sensors and channels alike; the error is also a KeyError, so that ``get`` works.
+    # Sensors and channels alike; the error is also a KeyError, as ``get`` requires.
     sample = data[0]
     with pytest.raises(gen_data.UnknownNameError, match=r"no camera 'colour'.*'color'"):
         _ = sample.cameras["colour"]
@@ -111,7 +111,7 @@ def test_a_dictionary_equals_the_file_with_its_content(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(MINIMAL))
     assert gen_data.Dataset(MINIMAL).config == gen_data.Dataset(file).config
-    # Also a shipped one, and leaves out what it inherits.
+    # Also a shipped one, and omits inherited values.
     own = {"extends": "tabletop.yaml", "without": {"exporters": "all"},
            "sensors": [{"name": "color", "size_px": [64, 48]}]}  # fmt: skip
     file = tmp_path / "mine.yaml"
@@ -120,14 +120,14 @@ def test_a_dictionary_equals_the_file_with_its_content(tmp_path: Path) -> None:
     assert gen_data.Dataset(own).config["sensors"][0]["size_px"] == [64, 48]
     with pytest.raises(gen_data.ConfigError, match=r"<config>:1:\d+: extends: .*tabeltop"):
         gen_data.Dataset({"extends": "tabeltop.yaml"})
-    # An object of a plug-in's class means what its YAML means.
+    # An object of a plug-in's class is equivalent to its YAML.
     sensor = {"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 70.0}
     typed = gen_data.Dataset({**MINIMAL, "sensors": [sensor]})
     from gen_data.sensors.camera.rgb_camera import RgbCamera
 
     camera = RgbCamera(name="color", size_px=(64, 48), hfov_deg=70.0)
     assert gen_data.Dataset({**MINIMAL, "sensors": [camera]}).config == typed.config
-    # The message is that of a file, with a place in the dictionary's own YAML.
+    # The same message as for a file, with a place in the dictionary's own YAML.
     wrong = {**MINIMAL, "views_per_scene": "many"}
     with pytest.raises(gen_data.ConfigError, match=r"<config>:\d+:\d+: views_per_scene: "):
         gen_data.Dataset(wrong)
@@ -227,7 +227,7 @@ def test_public_names_are_the_listed_ones_and_importing_loads_no_engine() -> Non
 
 @pytest.mark.slow
 def test_packages_of_the_same_names_do_no_harm(tmp_path: Path) -> None:
-    """A user's own ``configs``, ``exporters`` and ``tests`` lie beside the script, and it works.
+    """A user's own ``configs``, ``exporters`` and ``tests`` next to the script do no harm.
 
     The worker, which makes the sample, has the same search path.
     """

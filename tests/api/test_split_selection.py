@@ -74,7 +74,7 @@ def test_a_split_has_exactly_its_samples_in_order_and_scenes(data: gen_data.Samp
 
 
 def test_splits_and_slices_compose_in_any_order(data: gen_data.SampleSequence) -> None:
-    """A slice of a split counts its samples; a split of a slice has those in the slice."""
+    """A slice of a split counts its samples; a split of a slice has its samples in the slice."""
     assert numbers(data.split("train")[3:15:4]) == TRAIN[3:15:4]
     assert numbers(data.split("val")[::-1]) == VAL[::-1]
     assert numbers(data[7:30].split("val")) == [k for k in VAL if 7 <= k < 30]

@@ -16,7 +16,7 @@ BUILT = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
 
 
 def checkout(folder: Path, links: bool) -> Path:
-    """Copy what is built; without links, git writes their targets as texts instead."""
+    """Copy the sources of the build; without links, git writes their targets as texts instead."""
     for name in ("gen_data", *FOLDERS):
         ignored = shutil.ignore_patterns("__pycache__", "compiled")
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=ignored)

@@ -82,7 +82,7 @@ def test_every_library_of_the_identity_is_a_declared_dependency() -> None:
 
 
 def test_a_plan_names_the_release_of_every_library() -> None:
-    """So that ``pip install -U deflate`` in the middle of a data set is refused."""
+    """``pip install -U deflate`` in the middle of a data set must be refused."""
     versions = make_plan(PipelineFactory(load_config("tabletop.yaml"), n=1)).versions
 
     for package in BYTES_DEPEND_ON.values():

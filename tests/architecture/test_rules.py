@@ -1,4 +1,4 @@
-"""Rules that no linter knows; ruff, mypy and lint-imports run before the tests in ``.ci/run``."""
+"""Rules that no linter has; ruff, mypy and lint-imports run before the tests in ``.ci/run``."""
 
 import ast
 import subprocess
@@ -108,9 +108,9 @@ def has_no_bound(decorator: ast.expr) -> bool:
 
 
 def test_only_the_command_line_prints_and_reads_the_environment() -> None:
-    """Library code has no hidden inputs and no output of its own.
+    """Library code has no hidden inputs and does not print.
 
-    Packs say where they are and whether they may be fetched, and a fetch announces itself.
+    Packs state their place and whether they may be fetched, and a fetch announces itself.
     """
     offenders = [
         f"{path.relative_to(ROOT)}: {node.attr}"

@@ -1,4 +1,4 @@
-"""A configuration may extend another: it states only what differs."""
+"""A configuration may extend another: it states only the differences."""
 
 from pathlib import Path
 
@@ -108,7 +108,7 @@ def test_outputs_are_either_listed_or_left_out(folder: Path, key: str) -> None:
 
 
 def test_inherited_plugins_can_be_left_out(folder: Path) -> None:
-    """Before merging, so that another of the same name starts afresh."""
+    """Before merging: another item of the same name starts without inherited values."""
     own = """\
 extends: base.yaml
 without: {randomizers: [clutter], exporters: [coco], elements: [table], annotations: [boxes2d]}
@@ -125,7 +125,7 @@ randomizers: [{type: materials, name: clutter}]
 
 
 def test_a_chain_is_followed_and_paths_start_from_each_file(folder: Path) -> None:
-    """``../base.yaml`` is relative to the file that says so, whatever the current folder is."""
+    """``../base.yaml`` is relative to the file that contains it, whatever the current folder."""
     written(folder, "extends: ../base.yaml\nseed: 4\n", "sub/middle.yaml")
     spec = load_config(written(folder, "extends: sub/middle.yaml\nviews_per_scene: 2\n"))
 

@@ -78,7 +78,7 @@ def test_a_grid_in_the_frame_of_a_scanner_that_does_not_exist_is_refused_at_its_
 
 
 def test_every_sensor_that_does_not_fit_is_named() -> None:
-    """Two cameras on rigs that do not exist: both, and what exists."""
+    """Two cameras on rigs that do not exist: both are named, and the existing rigs."""
     message = refusal(
         cart({**CAMERA, "name": "a", "rig": "kart"}, {**CAMERA, "name": "b", "rig": "ego"})
     )

@@ -1,4 +1,4 @@
-"""The shipped rigs, and what is refused about them."""
+"""The shipped rigs, and changes to them that are refused."""
 
 import math
 from functools import cache

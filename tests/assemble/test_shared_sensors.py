@@ -1,4 +1,4 @@
-"""Sensors may depend on shared values, except in what all samples of a data set have in common."""
+"""Sensors may depend on shared values, except in properties common to all samples."""
 
 import math
 from pathlib import Path
@@ -41,7 +41,7 @@ def test_a_sensor_has_the_parameters_of_its_scene(tmp_path: Path) -> None:
 
 
 def test_a_sensor_captures_with_the_parameters_of_its_scene(tmp_path: Path) -> None:
-    """What is applied to an image after rendering varies with the scene, too."""
+    """Image processing after rendering varies with the scene, too."""
     camera = (
         "{type: rgb_camera, name: eye, size_px: [64, 48], time_offset_s: 0, "
         "exposure: {switch: lens, wide: {time_s: 0.004}, narrow: {time_s: 0.001}}}"

@@ -1,4 +1,4 @@
-"""First samples of shipped streets show what the configurations are for."""
+"""First samples of shipped streets show the intended content."""
 
 import pytest
 

@@ -90,7 +90,7 @@ def test_without_leaves_a_randomizer_out() -> None:
 
 
 def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
-    """What ``plan.json`` keeps is enough to make every sample of a data set again."""
+    """``plan.json`` is sufficient to make every sample of a data set again."""
     first = load_config("tabletop.yaml", seed=5, overrides=("randomizers.clutter.count=3",))
     plan = {"config": first.resolved, "name": first.name}
     (tmp_path / "plan.json").write_text(json.dumps(plan))

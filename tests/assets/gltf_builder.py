@@ -1,4 +1,4 @@
-"""A glTF document of one triangle, to which tests add what they read back."""
+"""A glTF document of one triangle, to which tests add the data that they read back."""
 
 import json
 import struct
@@ -19,7 +19,7 @@ _COMPONENTS = {"f4": 5126, "u1": 5121, "u2": 5123}
 
 
 class Builder:
-    """A glTF document of one triangle, with its buffer beside it."""
+    """A glTF document of one triangle, with its buffer next to it."""
 
     def __init__(self, points: NDArray[Any] = POINTS) -> None:
         self.data = b""
@@ -47,7 +47,7 @@ class Builder:
         return len(self.tree["accessors"]) - 1
 
     def textured(self, folder: Path, **reference: Any) -> dict[str, Any]:
-        """A material with an image of its own; returns it."""
+        """Add a material with a separate image; returns it."""
         Image.new("RGB", (2, 2), (200, 0, 0)).save(folder / "i.png")
         self.tree |= {"images": [{"uri": "i.png"}], "textures": [{"source": 0}]}
         pbr = {"baseColorTexture": {"index": 0, **reference}, "metallicFactor": 0}

@@ -26,7 +26,7 @@ def test_assets_are_as_asked_for_else_as_their_seed_makes_them_or_files(library:
     np.testing.assert_array_equal(wide[[0, 2]], free[[0, 2]])
     # It is 0 by default; equal assets have equal content.
     assert library.get("desk?width_m=1.6").sha256 == library.get("desk?seed=0&width_m=1.60").sha256
-    # The kind in the labels is that of the mesh.
+    # The kind in the labels matches the mesh.
     assert dict(library.get("straw_bale?kind=wrapped&seed=0").attributes)["kind"] == "wrapped"
     # Both draw the width, so both ids may ask for it: the leaf is half as wide.
     leaves = [size_m(library, f"wardrobe/door?seed=1&width_m={w}")[1] for w in (0.8, 1.2)]

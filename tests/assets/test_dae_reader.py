@@ -140,7 +140,7 @@ def test_geometry_with_a_broken_material_or_image_is_kept(tmp_path: Path) -> Non
     "path", ["model://shed/images/wood.png", "file://C:/me/wood.png", "C:\\me\\WOOD.png"]
 )
 def test_images_of_other_models_and_computers_are_found(tmp_path: Path, path: str) -> None:
-    """Beside the file, or in the folder of the model that has that name."""
+    """Next to the file, or in the folder of the model that has that name."""
     here = "shed/images/wood.png" if path.startswith("model") else "wood.png"
     (tmp_path / here).parent.mkdir(parents=True, exist_ok=True)
     (tmp_path / here).write_bytes(b"")

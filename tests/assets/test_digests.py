@@ -92,7 +92,7 @@ def test_a_file_as_young_as_its_digest_is_read_again(folder: Folder, tmp_path: P
 
 @pytest.mark.usefixtures("settled")
 def test_a_file_that_was_missing_and_came_changes_the_asset(folder: Folder, tmp_path: Path) -> None:
-    """A material library that is put beside its mesh later."""
+    """A material library that is put next to its mesh later."""
     (folder.root / "a.obj").write_bytes(b"mtllib a.mtl\n")
     known = ContentHashes(DiskCache(tmp_path / "cache"))
     assert set(known.of(folder, "a.obj")) == {"a.obj"}

@@ -41,7 +41,7 @@ def test_land_has_no_crack(library: Library) -> None:
 
 
 def test_land_is_near_the_ground_with_its_slots_textures_area_and_normals(library: Library) -> None:
-    """Near the road, by rays from above; its hollows are those of the level mesh."""
+    """Near the road, by rays from above; it has the hollows of the level mesh."""
     rng = np.random.default_rng(1)
     places = np.column_stack([rng.uniform(0.0, 120.0, 4000), rng.uniform(-40.0, 40.0, 4000)])
     above = np.column_stack([places, np.full(4000, 80.0)])
@@ -108,6 +108,6 @@ def _sides(mesh: MeshData, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
      ("car?at=0,0,0,1&relief=1,2,3", "has no parameter")],
 )  # fmt: skip
 def test_wrong_ids_are_refused(library: Library, text: str, message: str) -> None:
-    """With the id, and with what is expected."""
+    """With the id, and the expected form."""
     with pytest.raises(AssetError, match=message):
         library.mesh(text)

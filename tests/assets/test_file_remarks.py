@@ -1,4 +1,4 @@
-"""What is seen in a file and not used is told: by checks, plans, ``init`` and generation."""
+"""Unused content of a file is reported: by checks, plans, ``init`` and generation."""
 
 import json
 from pathlib import Path
@@ -51,7 +51,7 @@ def test_remarks_name_the_file_and_survive_the_cache(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_check_lists_remarks_and_still_succeeds(folder: Path) -> None:
-    """The picture is right but for what is listed."""
+    """The picture is right except for listed parts."""
     result = CliRunner().invoke(assets, ["check", str(folder)])
     assert result.exit_code == 0, result.output
     for text in REMARKS:
@@ -114,7 +114,7 @@ def test_files_of_one_stem_are_told_apart(folder: Path) -> None:
     ids=["Google Scanned Objects", "BOP", "ShapeNet", "own", "only a sorting folder"],
 )  # fmt: skip
 def test_categories_of_published_layouts(tmp_path: Path, file: str, category: str) -> None:
-    """The nearest folder whose name says something."""
+    """The nearest folder with a meaningful name."""
     path = tmp_path / "props" / file
     path.parent.mkdir(parents=True)
     path.write_text(TRIANGLE + FACE if file.endswith(".obj") else STL)

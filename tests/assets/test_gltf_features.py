@@ -156,7 +156,7 @@ def test_specular_glossiness(
     ["KHR_materials_", "KHR_materials_sheen", "KHR_texture_transform2", "KHR_texture_basisu"],
 )
 def test_extensions_are_compared_as_whole(builder: Builder, tmp_path: Path, name: str) -> None:
-    """What is not applied is refused if it is required, and named if it is used."""
+    """Unsupported extensions are refused if required, and named if used."""
     builder.tree["extensionsUsed"] = [name]
     assert builder.read(tmp_path).remarks == (f"the extension {name} is not used",)
     builder.tree["extensionsRequired"] = [name]

@@ -83,7 +83,7 @@ def draw(pose: SE3, ends: list[tuple[tuple[float, float, float], ...]]) -> UInt8
 
 
 def test_four_edges_of_a_table_are_no_horizon() -> None:
-    """They may be those of a wall; with its boards, and legs, they are."""
+    """They may have the bounds of a wall; with its boards and legs, they do."""
     pose = look_at((-1.2, 0.0, 1.7), (0.0, 0.1, 0.75), math.radians(2.0))
     x, y, z = (-0.35, 0.35), (-0.55, 0.55), 0.75
     edges = [((a, y[0], z), (a, y[1], z)) for a in x] + [((x[0], b, z), (x[1], b, z)) for b in y]

@@ -64,7 +64,7 @@ def test_a_drink_stays_inside_its_vessel(group: str) -> None:
 
 
 def test_labels_name_the_kind_and_contents_and_bananas_count_as_stated() -> None:
-    """The facts of a variant are those that its mesh was made with. By the role of the slots."""
+    """The facts of a variant match its mesh. By the role of the slots."""
     seed = first("bowl", set(FOODS))
     facts = FAMILIES["bowl"].facts
     assert facts is not None

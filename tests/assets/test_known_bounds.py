@@ -1,4 +1,4 @@
-"""Bounds that come with the package: those of the meshes, without making them."""
+"""Bounds in the package are equal to the bounds of the meshes, which are not made."""
 
 from collections import defaultdict
 from pathlib import Path

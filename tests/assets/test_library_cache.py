@@ -37,7 +37,7 @@ def entries(folder: Path) -> list[Path]:
 def test_stored_bounds_are_those_of_the_mesh_which_is_not_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asset: str
 ) -> None:
-    """Things that find no place in a scene cost no mesh; a car has bounds without mirrors too."""
+    """Objects without a place in a scene cost no mesh; a car has bounds without mirrors too."""
     first = open_library(cache_dir=tmp_path)
     first.bounds_m(asset)
     vertices_m = first.mesh(asset).vertices_m
@@ -139,7 +139,7 @@ def test_a_large_entry_is_checked_once_per_start_of_the_machine_and_again_after_
 
 
 def test_derived_arrays_are_stored_by_asset_and_name(tmp_path: Path) -> None:
-    """Another process loads them; another name, or another asset, computes anew."""
+    """Another process loads them; another name, or another asset, is computed again."""
     computed: list[int] = []
 
     def compute() -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""What pybullet installs: real sizes, right way up, found by tag."""
+"""Models of pybullet: real sizes, upright, found by tag."""
 
 import math
 from pathlib import Path
@@ -48,7 +48,7 @@ def test_teddies_and_random_shapes_have_their_files_sizes_and_textures(library: 
     assert size_m(library, "random_urdfs/000") == pytest.approx(expected, abs=1e-5)
     red, green, blue = library.materials("random_urdfs/000")[0].base_color
     assert blue > 10 * max(red, green)
-    # A material's texture id leads to the image that lies beside the mesh.
+    # A material's texture id leads to the image next to the mesh.
     (material,) = library.materials("pybullet/domino")
     assert library.texture(material.texture).albedo.shape == (1024, 2048, 3)
     assert material.printed

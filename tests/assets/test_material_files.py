@@ -1,4 +1,4 @@
-"""What files say of coats, glass, opacity, holes and light: it arrives, or is refused by name."""
+"""Coats, glass, opacity, holes and light of files: they are read, or refused by name."""
 
 import io
 from pathlib import Path
@@ -28,7 +28,7 @@ def png(pixels: np.ndarray) -> bytes:
 
 
 def gltf(folder: Path, material: dict[str, Any], **images: np.ndarray) -> None:
-    """A triangle with a material, beside its images, which have the numbers of their order."""
+    """A triangle with a material, next to its images, which have the numbers of their order."""
     for name, pixels in images.items():
         (folder / f"{name}.png").write_bytes(png(pixels))
     made = Builder()
@@ -180,7 +180,7 @@ def test_a_blended_image_is_opacity_and_holes(folder: Path) -> None:
 
 
 def test_mtl_says_opacity_light_coat_and_holes(folder: Path) -> None:
-    """``d`` goes before ``Tr``; a coverage image of its own is grey."""
+    """``d`` takes precedence over ``Tr``; a separate coverage image is grey."""
     triangle(
         folder,
         "newmtl m\nKd 1 1 1\nTr 0.9\nd 0.6\nKe 10 20 30\nPc 0.7\nPcr 0.1\nNi 1.4\n"
@@ -262,7 +262,7 @@ def test_names_of_maps_survive_any_file_name_and_several_sizes_take_the_largest(
     assert find_maps(maps.name()) == maps
     assert find_maps("plain.png") is None
     assert TextureMaps(albedo="plain.png").name() == "plain.png"
-    # A grey of 2 x 2 beside a colour of 8 x 4.
+    # A grey of 2 x 2 and a colour of 8 x 4.
     small, large = np.full((2, 2, 3), 70, np.uint8), np.full((4, 8, 3), 9, np.uint8)
     texture = compose_texture(
         TextureMaps(albedo="s", emission="l"), {"s": small, "l": large}.__getitem__

@@ -36,7 +36,7 @@ def test_a_convex_solid_is_one_part_with_its_corners_and_groups_of_a_file_stay_p
 
 
 def test_a_hollow_thing_stays_hollow_and_its_parts_cover_its_surface_every_time() -> None:
-    """A tray's parts leave its middle free, so that things can lie in it."""
+    """A tray's parts leave its middle free for objects."""
     parts = convex_parts(tray(), "tray", max_parts=16).parts_m
     assert len(parts) > 4
     middle = np.array([0.0, 0.0, 0.06])

@@ -269,7 +269,7 @@ def test_hostile_meshes_are_refused(tmp_path: Path, name: str) -> None:
 FAULTY_JOINTS = {"loop": "joint 'j1' is part of a loop",
                  "two parents": "joint 'j2' closes a loop: link 'c' has another parent already",
                  "no limits": "joint 'j' has no limits"}  # fmt: skip
-"""A robot's author finds the joint by its name and its place, which is not that of the root."""
+"""A robot's author finds the joint by its name and its place, which is not the root's."""
 
 
 @pytest.mark.hostile
@@ -325,7 +325,7 @@ def test_hostile_images_are_refused(tmp_path: Path, name: str) -> None:
 
 
 def test_a_roughness_that_does_not_exist_is_told_by_name(tmp_path: Path) -> None:
-    """The file, the factor, its value and what it may be; at the ends of the range it is read."""
+    """The file, the factor, its value and the allowed range; at its ends it is read."""
     folder = tmp_path / "assets"
     folder.mkdir()
     for name, value in (("bad", 1.5), ("mirror", 0.0), ("chalk", 1.0)):

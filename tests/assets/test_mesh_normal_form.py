@@ -142,6 +142,6 @@ def _subdivided(corners: np.ndarray, times: int) -> np.ndarray:
      (np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]]), "degenerate")],
 )  # fmt: skip
 def test_unusable_soups_are_refused(corners: np.ndarray, reason: str) -> None:
-    """The message names the place, the fact and what to do."""
+    """The message names the place, the fact and the remedy."""
     with pytest.raises(AssetError, match=rf"^place: .*{reason}"):
         normal_form(TriangleSoup.of(corners), "place")

@@ -1,4 +1,4 @@
-"""File formats: what the files say is what is read."""
+"""File formats: content is read as the files state it."""
 
 import base64
 import json
@@ -154,7 +154,7 @@ def test_images_inside_the_meshes_of_a_robot_are_those_of_its_links(tmp_path: Pa
 
 
 def test_gltf_with_separate_and_inline_buffers_agree_and_other_tools(tmp_path: Path) -> None:
-    """A .bin beside the file, a data URI and a GLB hold the same triangles."""
+    """A .bin next to the file, a data URI and a GLB contain the same triangles."""
     made = textured_triangle(tmp_path)
     (tmp_path / "a.glb").write_bytes(made.glb())
     (tmp_path / "my data.bin").write_bytes(made.data)

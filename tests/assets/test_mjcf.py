@@ -71,7 +71,7 @@ def poses_of(described: RobotDescription, positions: dict[str, float]) -> dict[s
 
 @pytest.mark.parametrize("positions", [(0.0, 0.0, 0.0), (0.3, -0.05, 1.2), (-1.5, 0.3, -3.0)])
 def test_geoms_are_where_mujoco_has(tmp_path: Path, positions: tuple[float, float, float]) -> None:
-    """At any joint positions, with anchors beside the origin, a reference and two joints a body."""
+    """At any joint positions, with anchors off the origin, a reference and two joints a body."""
     described = read_mjcf(write(tmp_path), "arm.xml")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
     data = mujoco.MjData(model)
@@ -115,7 +115,7 @@ def test_meshes_joints_and_groups_are_those_of_mujoco(tmp_path: Path) -> None:
         "lift": ("prismatic", -0.1, 0.3),
         "spin": ("continuous", -np.pi, np.pi),
     }
-    # A body with geoms for the eye shows these only; any other shows what collides.
+    # A body with visual geoms shows these only; any other shows its collision geoms.
     links = described.links
     kinds = {n: ([s.kind for s in k.visuals], [s.kind for s in k.collisions])
              for n, k in links.items() if k.visuals or k.collisions}  # fmt: skip

@@ -1,6 +1,6 @@
-"""A person's own files: written by many tools, read as their makers mean them.
+"""Files of users: written by many tools, read as their authors intend.
 
-Expected values are those of the files themselves, of the formats' rules, or computed by hand.
+Expected values come from the files themselves, from the formats' rules, or are computed by hand.
 """
 
 import struct
@@ -376,7 +376,7 @@ def test_origin_file_keeps_coordinates_and_other_origins_state_their_shift(tmp_p
 
 @pytest.mark.slow
 def test_links_of_robots_keep_colours_of_vertices(tmp_path: Path) -> None:
-    """A link with a gradient has an image of its own; one of one colour a base colour."""
+    """A link with a gradient has a separate image; one of one colour a base colour."""
     root = tmp_path / "robots"
     root.mkdir()
     (root / "square.ply").write_bytes(ply_text())

@@ -1,4 +1,4 @@
-"""Panoramas of users: Radiance and OpenEXR; what is no light is refused with one clear error."""
+"""Panoramas of users: Radiance and OpenEXR; invalid light is refused with one clear error."""
 
 import tempfile
 from collections.abc import Callable
@@ -42,7 +42,7 @@ def test_openexr_and_radiance_hold_the_same_light_and_ringing_below_zero_is_dark
     rows = np.cos(np.pi * np.arange(9) / 8)
     mean = ((exr @ (0.2126, 0.7152, 0.0722)).mean(axis=1) * 0.5 * (rows[:-1] - rows[1:])).sum()
     assert mean == pytest.approx(1.0, rel=1e-6)
-    # Filters leave values a little below zero beside a sun; they are taken for none.
+    # Filters leave values a little below zero next to a sun; they count as zero.
     rgb = with_texel(-1e-5)
     assert decode_radiance(exr_file(rgb), "sky")[5, 3, 1] == 0.0
 
@@ -90,7 +90,7 @@ def test_what_is_no_image_is_refused_and_nothing_is_kept(
 
 
 def test_a_panorama_of_the_user_lights_as_one_of_the_packs(tmp_path: Path) -> None:
-    """An OpenEXR file in a folder of one's own is an environment by its id."""
+    """An OpenEXR file in a user's folder is an environment by its id."""
     (tmp_path / "sky.exr").write_bytes(exr_file(pixels(16)))
     (tmp_path / "assets.yaml").write_text(
         "environments:\n  - {id: sky, file: sky.exr, tags: [outdoor]}\n"

@@ -178,7 +178,7 @@ def test_a_mask_of_another_size_is_refused_and_wrong_fields_have_a_place(tmp_pat
 
 
 def test_surroundings_light_the_ground_as_the_photograph_shows_it(tmp_path: Path) -> None:
-    """Illuminance of level ground by the sky, integrated here, is what its albedo calls for."""
+    """Illuminance of level ground by the sky, integrated here, matches its albedo."""
     given = f"ground: {GROUND}, hfov_deg: 60, horizon: {{height_px: 300}}, ground_albedo: 0.25"
     image = np.full((640, 960, 3), 200, np.uint8)
     image[300:] = (90, 110, 70)

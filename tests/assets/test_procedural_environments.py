@@ -1,4 +1,4 @@
-"""Environments: mean luminance, orientation, and what must be bright."""
+"""Environments: mean luminance, orientation, and their bright parts."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Furniture: sizes asked for are sizes got, and things can be put on and in it."""
+"""Furniture: it has the requested sizes, and objects can be put on and in it."""
 
 import numpy as np
 import pytest
@@ -113,7 +113,7 @@ def test_rooms_face_inward_and_their_walls_and_floors_are_solid_outside() -> Non
     assert _inside_any(solid, (14.0, -9.0, -0.1))
     assert not _inside_any(solid, (15.1, 0.0, 1.0))
     assert not _inside_any(solid, (0.0, 0.0, 3.1))
-    # What does not fit is left out; the walls are then whole.
+    # Windows that do not fit are left out; the walls are then whole.
     whole = FAMILIES["room"].build(size_m=(5.0, 4.0, 2.8), door=0, window=0).mesh
     small = FAMILIES["room"].build(size_m=(1.5, 1.5, 2.0)).mesh
     assert set(np.unique(whole.face_slots)) == set(np.unique(small.face_slots)) == {0, 1, 2, 3}

@@ -41,7 +41,7 @@ LONGEST_SIDE_M = {
     "washer": (0.014, 0.04), "wine_glass": (0.13, 0.245), "wrench": (0.1, 0.26),
 }  # fmt: skip
 
-# What is open by design: a gable that sits on its box, pipe ends covered by collars.
+# Open by design: a gable that sits on its box, pipe ends covered by collars.
 OPEN_EDGES = {"milk_carton": 0.02, "pipe_elbow": 0.02, "flange": 0.005}
 
 
@@ -51,14 +51,14 @@ for_every_variant = for_every(
 
 
 def test_every_object_family_has_a_stated_real_size() -> None:
-    """A new family must say how big the real thing is."""
+    """A new family must state the size of the real object."""
     assert set(LONGEST_SIDE_M) == set(OBJECTS)
 
 
 @pytest.mark.slow
 @for_every_variant
 def test_objects_are_closed_of_real_size_centred_and_near_hulls(built: tuple[str, Solid]) -> None:
-    """The longest side lies in the range that is measured on real things."""
+    """The longest side lies in the range measured on real objects."""
     name, solid = built
     low, high = solid.mesh.bounds_m()
     longest = max(b - a for a, b in zip(low, high, strict=True))

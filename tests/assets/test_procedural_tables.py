@@ -1,4 +1,4 @@
-"""Tables of content beside the modules: typed rows by key, in the file's order."""
+"""Tables of content next to the modules: typed rows by key, in the file's order."""
 
 from pathlib import Path
 

@@ -70,7 +70,7 @@ def test_normals_point_out_of_the_surface(name: str) -> None:
 @pytest.mark.parametrize("name", sampled(TILING, 3))
 @pytest.mark.parametrize("seed", [0, 1])
 def test_surfaces_tile_without_a_seam(name: str, seed: int) -> None:
-    """The step across the image's border is hardly larger than the largest steps inside."""
+    """The step across the image's border barely exceeds the largest steps inside."""
     made = texture(name, seed)
     images = [made.albedo, made.normal if made.normal is not None else made.albedo]
     for image in images:

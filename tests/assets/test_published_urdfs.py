@@ -124,7 +124,7 @@ def test_a_joint_without_limits_is_refused_with_remedy_unless_it_mimics_one(tmp_
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 def test_floating_and_planar_joints_stay_at_their_origin(tmp_path: Path, kind: str) -> None:
-    """The thing is read; a remark names the joint and its line."""
+    """The robot is read; a remark names the joint and its line."""
     described = describe(
         tmp_path, link("a"), link("b"),
         joint("j", "a", "b", '<origin xyz="0 0 1"/>', kind),
@@ -155,7 +155,7 @@ def test_markers_without_volume_are_left_out_by_name(tmp_path: Path, shape: str,
     "shape", ['<sphere radius="-1"/>', '<box size="1 -1 1"/>', '<cylinder radius="1" length="-1"/>']
 )
 def test_negative_sizes_are_refused_with_link_and_line(tmp_path: Path, shape: str) -> None:
-    """They are slips of the pen, and nobody can guess what was meant."""
+    """They are slips of the pen, and their meaning cannot be guessed."""
     with pytest.raises(AssetError, match=r"a\.urdf:3:\d+: .*link 'b': <collision>: .* size -1"):
         describe(tmp_path, link("a"), link("b", collision=f"<geometry>{shape}</geometry>"))
 

@@ -1,6 +1,6 @@
 """The process that reads assets: limits, crashes, and its end.
 
-The functions called in it are those of Python itself that do what a hostile file makes a parser do.
+The functions called in it are Python's own, with the effects that a hostile file has on a parser.
 """
 
 import ctypes

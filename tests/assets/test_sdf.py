@@ -178,7 +178,7 @@ def test_before_version_1_7_a_joint_may_have_the_name_of_its_link(tmp_path: Path
 
 @pytest.mark.slow
 def test_meshes_materials_and_textures_of_gazebo(tmp_path: Path) -> None:
-    """Diffuse colours replace those of a mesh; sRGB 0.5 is 0.214041 linear (IEC 61966-2-1)."""
+    """Diffuse colours replace the mesh's; sRGB 0.5 is 0.214041 linear (IEC 61966-2-1)."""
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes/a.obj").write_text(TETRAHEDRON)
     Image.new("RGB", (4, 4), (0, 255, 0)).save(tmp_path / "meshes/a.png")
@@ -286,7 +286,7 @@ def test_faults_have_one_clear_error(tmp_path: Path, part: str, reason: str) -> 
 
 
 def test_entities_and_files_with_two_models_are_refused(tmp_path: Path) -> None:
-    """Nobody knows which one is meant."""
+    """The intended one is ambiguous."""
     (tmp_path / "a.sdf").write_text("<!DOCTYPE a [<!ENTITY b 'c'>]><sdf><model name='&b;'/></sdf>")
     with pytest.raises(AssetError, match=r"a\.sdf: .*declares a document type"):
         read_sdf(Folder(tmp_path), "a.sdf")

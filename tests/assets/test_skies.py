@@ -137,7 +137,7 @@ def test_preethams_sky_is_shaped_as_the_standard_clear_sky(altitude_deg: float) 
 def test_preethams_light_is_that_of_a_clear_day(altitude_deg: float, turbidity: float) -> None:
     """On level ground within 15 % of IES RP-21: 127.5 klx exp(-0.21 m) sin h, and the clear sky.
 
-    Preetham's sky alone is up to twice as bright as that of IES, his sun the dimmer for it.
+    Preetham's sky alone is up to twice as bright as the IES sky, and his sun dimmer in turn.
     """
     altitude = math.radians(altitude_deg)
     model = SkyModel(0, altitude_deg, turbidity, model="preetham")

@@ -1,4 +1,4 @@
-"""Bottles, prints and supports of things as photographs show them."""
+"""Bottles, prints and supports of objects as in photographs."""
 
 from collections.abc import Callable
 
@@ -48,7 +48,7 @@ def test_crushed_bottles_are_dented_by_a_tenth_of_their_radius_and_others_are_ro
 
 @pytest.mark.parametrize("manner", MANNERS)
 def test_pictures_are_made_as_asked_and_differ_by_seed(manner: str) -> None:
-    """Lines have few colours, photographs hundreds; both manners fill what they are given."""
+    """Lines have few colours, photographs hundreds; both manners fill the whole image."""
     made = [
         np.asarray(picture(160, 120, (244, 241, 234), variant_rng("t", seed), manner))  # type: ignore[arg-type]
         for seed in range(4)
@@ -70,7 +70,7 @@ def test_prints_of_mugs_show_the_same_picture_on_both_sides_of_the_handle() -> N
 
 
 def test_look_alikes_have_no_category_of_what_they_resemble() -> None:
-    """They are on no list of household objects, so that only close-ups have them."""
+    """They are on no list of household objects: only close-ups have them."""
     for name in LIKE:
         family = FAMILIES[name]
         assert family.category not in WANTED
@@ -139,7 +139,7 @@ def _contains(part: np.ndarray, point: np.ndarray) -> bool:
 
 @pytest.mark.parametrize("group", ["apple", "orange", "lemon", "lime", "kiwi"])
 def test_slices_of_fruit_are_discs_of_flesh_with_a_rim_of_skin(group: str) -> None:
-    """Both faces are flesh; the volume is that of a disc with a slightly round rim."""
+    """Both faces are flesh; the volume equals a disc's with a slightly round rim."""
     seed = next(seed for seed in range(60) if fruit_kind(group, seed) == f"{group}/slice")
     mesh = FAMILIES[group].build(seed=seed).mesh
     a, b, c = mesh.vertices_m.astype(np.float64)[mesh.faces].transpose(1, 0, 2)

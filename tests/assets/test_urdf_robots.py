@@ -1,4 +1,4 @@
-"""Robots: kinematics as the URDF says, geometry link by link."""
+"""Robots: kinematics as stated by the URDF, geometry link by link."""
 
 import math
 
@@ -118,7 +118,7 @@ def test_links_come_root_first_collide_and_may_touch_others(library: Library, na
         assert (joint.parent, joint.child) in robot.no_collide
     solid = list(robot.collisions)
     assert (solid[0], solid[-1]) not in robot.no_collide
-    # At most 35,000 triangles for a robot, and hulls close to what is seen.
+    # At most 35,000 triangles for a robot, and hulls close to the visible mesh.
     total = 0
     for link, asset_id in robot.visuals.items():
         mesh = library.mesh(asset_id)

@@ -81,7 +81,7 @@ def test_an_index_says_what_files_are(folder: Path) -> None:
 
 
 def test_a_folder_without_an_index_offers_every_mesh_and_panorama(folder: Path) -> None:
-    """Category is the folder's name; files that are no meshes are passed over."""
+    """Category is the folder's name; files that are not meshes are skipped."""
     write_box(folder / "nut.stl", (0.02, 0.02, 0.01))
     write_box(folder / "bolts/m8 long.obj", (0.01, 0.01, 0.05))
     (folder / "notes.txt").write_text("nothing")

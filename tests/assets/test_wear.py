@@ -1,4 +1,4 @@
-"""Wear of household things: where it lies is measured on meshes, not on the images."""
+"""Wear of household objects: its place is measured on meshes, not on the images."""
 
 from functools import cache
 
@@ -102,11 +102,11 @@ def test_ink_is_rubbed_off_at_convex_edges_of_the_mesh(variant: tuple[str, int])
 
 @pytest.mark.slow
 def test_new_prints_are_as_printed_and_dust_of_boxes_lies_on_upper_faces() -> None:
-    """Those of the least wear, off the face that dust falls on."""
+    """Parts with the least wear, off the face on which dust falls."""
     for name in ("label", "front_label", "can_label"):
         newest = min(range(48), key=lambda seed: draw_wear(name, seed))
         assert change(name, newest).mean() < 1.5, name
-    # By the mesh's normals: what is not used yet changes there only.
+    # By the mesh's normals: unused objects change there only.
     above, beside = [], []
     for seed in (s for s in range(48) if draw_wear("carton", s) < 0.05):
         mesh = FAMILIES["carton"].build(seed=seed).mesh
@@ -141,7 +141,7 @@ def test_most_labels_stay_legible_and_worn_places_are_duller(name: str) -> None:
     """On nine of ten variants at most a tenth of all pixels changes by more than a quarter."""
     hidden = [(change(name, seed) > 64).mean() for seed in range(0, TEXTURES[name].variants, 4)]
     assert np.quantile(hidden, 0.9) < 0.1
-    # The roughness factor is 1 where it is dullest, less elsewhere on used things.
+    # The roughness factor is 1 where it is dullest, less elsewhere on used objects.
     used = max(range(TEXTURES[name].variants), key=lambda seed: draw_wear(name, seed))
     rough = worn(name, used).roughness
     assert rough is not None

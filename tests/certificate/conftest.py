@@ -1,4 +1,4 @@
-"""A small data set to certify, and what reseals a damaged copy of it."""
+"""A small data set to certify, and a function that reseals a damaged copy of it."""
 
 import shutil
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Seals of damaged data sets: all checksums are those of the files again."""
+"""Seals of damaged data sets: all checksums match the files again."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""What ``gen-data describe`` and ``gen-data schema`` tell about a plug-in."""
+"""Output of ``gen-data describe`` and ``gen-data schema`` on a plug-in."""
 
 import json
 from enum import Enum
@@ -158,14 +158,14 @@ INVALID: list[dict[str, Any]] = [{}, {"name": 3}, {"name": "a", "unknown": 1},
 
 @pytest.mark.parametrize("document", [*VALID, *INVALID], ids=json.dumps)
 def test_the_schema_accepts_what_validation_accepts(document: dict[str, Any]) -> None:
-    """Editors must not underline what works; common mistakes are refused."""
+    """Editors must not underline valid text; common mistakes are refused."""
     assert validator_of(Lighting).is_valid(document) == (document in VALID)
     if document in VALID:
         Lighting.model_validate_json(json.dumps(document))
 
 
 def test_the_schema_tells_meanings_and_shares_distributions_the_same_every_time() -> None:
-    """What a number's distribution may be stands once, however many fields use it."""
+    """Distributions of a number are listed once, however many fields use them."""
     schema = json_schema(Lighting)
     assert schema["description"] == "Illuminance and azimuth of every directional light."
     lux = schema["properties"]["illuminance_lux"]

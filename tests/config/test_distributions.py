@@ -162,7 +162,7 @@ ZERO_WIDTH: list[tuple[Distribution[Any], Any]] = [
 
 @pytest.mark.parametrize(("distribution", "value"), ZERO_WIDTH)
 def test_a_range_of_no_width_is_constant(distribution: Distribution[Any], value: object) -> None:
-    """Bit for bit, so that a range can be narrowed to nothing."""
+    """Bit for bit: a range can be narrowed to nothing."""
     rng = rng_of(0)
     assert {distribution.draw(rng) for _ in range(20)} == {value}
 
@@ -183,7 +183,7 @@ def test_supports_are_as_stated(distribution: Numeric[Any], support: tuple[float
 
 
 def test_outcomes_reprs_and_sequences_tell_what_can_be_drawn() -> None:
-    """So that names can be checked before a run; names have no range."""
+    """Names can be checked before a run; names have no range."""
     assert Choice({"a": 1, "b": 0}).outcomes() == ("a",)
     assert Sequence(("a", "b")).outcomes() == ("a", "b")
     assert Constant("a").outcomes() == ("a",)

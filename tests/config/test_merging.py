@@ -1,4 +1,4 @@
-"""Which parts of a document merge with what is laid over them, and which are replaced."""
+"""Parts of a document that merge with overrides, and parts that are replaced."""
 
 from typing import Any
 
@@ -49,7 +49,7 @@ MERGED: dict[str, tuple[str, str, Any]] = {
         "x: {switch: style, old: 1, new: 2}", "x: {switch: traffic, light: 3, default: 4}",
         {"x": {"switch": "traffic", "light": 3, "default": 4}}),
 }  # fmt: skip
-"""What is below, what is laid over it, and the result."""
+"""Base, override, and the result."""
 
 
 @pytest.mark.parametrize(("base", "override", "merged"), MERGED.values(), ids=list(MERGED))
@@ -91,7 +91,7 @@ C, D = {"name": "c"}, {"name": "d"}
          "items without a name are told apart by their type"],
 )  # fmt: skip
 def test_items_of_lists_merge_by_name(base: str, override: str, merged: list[object]) -> None:
-    """The order in which randomizers run is that of the list."""
+    """Randomizers run in the order of the list."""
     below, above = parse_yaml(base, "base").get("l"), parse_yaml(override, "over").get("l")
     assert below is not None and above is not None
     assert merge_named(below, above).plain() == merged

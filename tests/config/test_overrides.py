@@ -104,7 +104,7 @@ def test_paths_that_cannot_be_followed_are_refused(path: str, fact: str) -> None
 @settings(max_examples=400, deadline=None, derandomize=True)
 @given(st.text("ab.[]0123=seed\n\x00 ", max_size=20), st.text("a1[]{}:,&*! \n'\"", max_size=20))
 def test_any_override_gives_a_tree_or_an_error(path: str, value: str) -> None:
-    """What comes from a shell may be anything."""
+    """Text from a shell may be anything."""
     try:
         outcome = type(with_override(parse_yaml(TEXT, "t.yaml"), path, value).plain()).__name__
     except ConfigError as error:

@@ -119,7 +119,7 @@ def test_a_missing_asset_folder_is_told_with_its_place(tmp_path: Path) -> None:
     [("n" * 300, "too long"), ("~nobody-here/x", "home directory"), ("a\nb", r"'a\\nb'; looked")],
 )
 def test_an_impossible_file_name_is_refused_at_once(tmp_path: Path, name: str, reason: str) -> None:
-    """With its place, whatever the operating system says of it."""
+    """With its place, whatever the operating system's message."""
     with pytest.raises(ConfigError, match=reason) as caught:
         find_path(name, at(tmp_path / "mine.yaml"), "template", "template")
     assert "\n" not in str(caught.value)

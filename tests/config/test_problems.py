@@ -53,5 +53,5 @@ def test_a_long_line_is_shown_around_the_place() -> None:
      (("a b", "c.d"), "['a b']['c.d']")],
 )  # fmt: skip
 def test_paths_are_dotted(path: tuple[str | int, ...], text: str) -> None:
-    """Indices in brackets; keys that are no plain words in quotes."""
+    """Indices in brackets; keys that are not plain words in quotes."""
     assert format_path(path) == text

@@ -96,7 +96,7 @@ def test_old_words_may_stand_in_selections_but_not_beside_the_new_word() -> None
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::FutureWarning")
 def test_the_command_line_may_use_old_words_too(tmp_path: Path) -> None:
-    """They win over what the file says, as overrides do."""
+    """They take precedence over the file, like overrides."""
     path = tmp_path / "mine.yaml"
     path.write_text("extends: street.yaml\n")
     spec = load_config(str(path), overrides=("randomizers.people.rows=3",))
@@ -144,7 +144,7 @@ def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> N
 
 
 def test_an_override_without_a_type_may_use_old_words(tmp_path: Path) -> None:
-    """Nested ones too; what it does not override stays inherited, and the last file wins."""
+    """Nested ones too; other values stay inherited, and the last file takes precedence."""
     (tmp_path / "base.yaml").write_text(
         "template: tabletop\n"
         "sensors: [{type: rgb_camera, name: c, image_pipeline: {glare: 0.1, flare: 0.2}}]\n"

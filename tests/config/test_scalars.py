@@ -18,7 +18,7 @@ CORE_SCHEMA = [("", None), ("~", None), ("null", None), ("true", True), ("FALSE"
 
 @pytest.mark.parametrize(("text", "value"), CORE_SCHEMA)
 def test_unquoted_scalars_follow_the_core_schema(text: str, value: object) -> None:
-    """What YAML 1.1 would have read as a date, a boolean or base sixty is a string."""
+    """Words that YAML 1.1 reads as a date, a boolean or base sixty are strings."""
     resolved = resolve_scalar(text)
     assert resolved == value
     assert type(resolved) is type(value)

@@ -1,4 +1,4 @@
-"""Shared values: drawn once per scene, referred to anywhere, selecting what depends on them."""
+"""Shared values: drawn once per scene, referred to anywhere, selecting dependent values."""
 
 import re
 import sys
@@ -45,7 +45,7 @@ def test_a_value_is_of_the_kind_it_is_written_as(text: str, kind: type) -> None:
 
 
 def test_order_of_writing_moves_no_draw_and_no_probe() -> None:
-    """Each value has a stream of its own."""
+    """Each value has a separate stream."""
     lines = SECTION.strip().splitlines()
     for order in (lines[::-1], [*lines[2:], *lines[:2]]):
         again = parse_yaml("\n".join(order), "test")
@@ -136,7 +136,7 @@ def test_probes_of_the_street_show_every_outcome_of_a_thousand_scenes() -> None:
      ("x: {switch: road, bend: 1}", "test:1:4: x: no entry for road = 'street'")],
 )  # fmt: skip
 def test_a_reference_that_leads_nowhere_is_one_clear_error(text: str, fact: str) -> None:
-    """Place, fact, and what was expected; values that need one another are refused, too."""
+    """Place, fact, and expected values; values that need one another are refused, too."""
     with pytest.raises(ConfigError, match=f"^{re.escape(fact)}"):
         resolve_shared(parse_yaml(text, "test"), {"road": "street"})
     with pytest.raises(ConfigError, match="need one another"):

@@ -1,10 +1,10 @@
-"""The table of bounds that comes with the package, and the command that renews it.
+"""The table of bounds in the package, and the command that renews it.
 
 ``python -m tests.contracts.asset_bounds``
 
 It keeps the rows of families that have the same version, and makes the objects of all others:
-those offered for selection, and those that shipped configurations can use. The people pack must be
-installed. A missing row costs time on machines with empty caches, and nothing else.
+variants offered for selection, and variants that shipped configurations can use. The people pack
+must be installed. A missing row costs time on machines with empty caches, and nothing else.
 """
 
 import sys

@@ -33,7 +33,7 @@ def read_stored() -> tuple[dict[str, str], dict[str, dict[str, str]]]:
 
 
 def numerics() -> dict[str, str]:
-    """What bytes of assets depend on besides the code: the machine, and two libraries' releases."""
+    """Inputs of the bytes of assets besides the code: the machine, and two libraries' releases."""
     image = np.sin(np.arange(512 * 512, dtype=np.int64) ** 2 % 7919).astype(np.float32)
     return {
         **host_digests(),

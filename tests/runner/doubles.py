@@ -37,7 +37,7 @@ RESUME = "gen-data --config fake.yaml --n 10 --out here"
 
 @dataclass(frozen=True)
 class Trouble:
-    """What goes wrong, by sample index; -1 = nothing does.
+    """Faults by sample index; -1 = no fault.
 
     Attributes:
         killed_at: The process kills itself.
@@ -68,7 +68,7 @@ class Trouble:
 
 @dataclass(frozen=True)
 class LinesExporter:
-    """One JSON line per annotated object; links every image beside them."""
+    """One JSON line per annotated object; links every image next to them."""
 
     needs: frozenset[str] = frozenset()
 
@@ -241,6 +241,6 @@ def tree_digest(folder: Path) -> str:
 
 
 def notes_of(out: Path) -> list[str]:
-    """What the run's log tells about its workers."""
+    """Entries of the run's log about its workers."""
     entries = [json.loads(line) for line in (out / "run" / "log.jsonl").read_text().splitlines()]
     return [entry["note"] for entry in entries if "note" in entry]

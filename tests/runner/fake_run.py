@@ -1,8 +1,8 @@
-"""A fake data set made by a process of its own.
+"""A fake data set made by a separate process.
 
 ``python -m tests.runner.fake_run OUT WORKERS DELAY_S [BALLAST_BYTES]``
 
-Tests kill it. Exit codes and message are those of the command line.
+Tests kill it. Exit codes and messages equal the command line's.
 """
 
 import os

@@ -1,9 +1,9 @@
 """A disk that fails at the k-th operation: by an errno, by a kill, or by a power cut.
 
 Every operation through which the runner changes a folder is counted. A kill freezes the process: no
-later operation happens. A power cut also loses what no fsync had made durable: bytes of files,
-renames, new and removed names; what is lost beyond that is drawn from a seed, because POSIX leaves
-it open.
+later operation happens. A power cut also loses changes that no fsync had made durable: bytes of
+files, renames, new and removed names; which of them are lost is drawn from a seed, because POSIX
+leaves it open.
 """
 
 import errno
@@ -129,7 +129,7 @@ class FragileDisk:
 
     def _note_mkdir(self, path: str, *_: str) -> Pending | None:
         if path == str(self.root):
-            # Its parent is outside of what is watched.
+            # Its parent is outside the watched folder.
             return None
         return Pending(str(Path(path).parent), lambda: shutil.rmtree(path, ignore_errors=True))
 
@@ -148,7 +148,7 @@ class FragileDisk:
         return kept
 
     def cut_power(self, seed: int) -> None:
-        """Lose what was not durable: some names, newest first, then bytes."""
+        """Lose changes that were not durable: some names, newest first, then bytes."""
         self.healed = True
         rng = random.Random(seed)
         share, remains = rng.choice([0.0, 0.5, 1.0]), rng.choice(REMAINS)
@@ -173,4 +173,4 @@ REMAINS: tuple[Callable[[bytes], bytes], ...] = (
     lambda data: b"\0" * len(data),
     lambda data: data,
 )
-"""What may be left of bytes that were not synced."""
+"""A possible remainder of bytes that were not synced."""

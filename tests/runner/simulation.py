@@ -6,7 +6,7 @@
 The second form simulates one run on a cluster, each of whose machines is lost with probability LOSS
 per sample, and prints its efficiency and the load of the supervisor.
 
-Drives the production supervisor on a virtual clock. A process has a life of its own: commands reach
+Drives the production supervisor on a virtual clock. Processes are independent: commands reach
 it through a pipe after a delay, its messages arrive late but in order, and its end arrives after
 the messages that it sent before. Everything follows from the seed.
 """
@@ -34,11 +34,11 @@ class Faults:
     """Probabilities of faults.
 
     Attributes:
-        dies_at_start, stops_at_start: Of a new process.
-        dies, stops: Of a process, per sample.
-        dies_after_commit: Of a process that has committed a shard and not reported it.
-        stays: Of a process that was dismissed.
-        loses_machine: Of the machine of a process, per sample.
+        dies_at_start, stops_at_start: For a new process.
+        dies, stops: For a process, per sample.
+        dies_after_commit: For a process that has committed a shard and not reported it.
+        stays: For a process that was dismissed.
+        loses_machine: For the machine of a process, per sample.
         poisoned: Index of a sample that kills its process, or -1.
         fails_at: Index of a sample that cannot be written, or -1.
         abort_s: Instant of Ctrl-C.
@@ -99,7 +99,7 @@ class Run:
         chosen_faults: None = drawn.
         sample_s: Longest time of a sample.
         late_s: Longest delay of a command or a message.
-        limits: Of the supervisor.
+        limits: Limits of the supervisor.
         busy_s: Virtual time in which processes worked on shards that they committed.
         handling_s: Real time in which the supervisor handled events.
         events: Number of events.
@@ -139,7 +139,7 @@ class Run:
         )
 
     def execute(self) -> GenDataError | None:
-        """Run until the supervisor is finished, and check what it promises."""
+        """Run until the supervisor is finished, and check its promises."""
         self._at(0.0, "tick")
         if self.faults.abort_s < END_S:
             self._at(self.faults.abort_s, "abort")

@@ -182,7 +182,7 @@ def test_a_shard_in_which_every_sample_fails_is_a_valid_part(tmp_path: Path) -> 
 
 
 def test_an_unfinished_data_set_is_resumed_without_its_failed_samples(tmp_path: Path) -> None:
-    """What was committed stays; the second run makes the shard that was missing."""
+    """Committed shards stay; the second run makes the missing one."""
     make(tmp_path / "at once", trouble=Trouble(bug_at=1), settings=SKIP)
     first = Trouble(errors={1: ValueError(), 6: OutOfMemory("no memory")})
     with pytest.raises(OutOfMemory):
@@ -193,7 +193,7 @@ def test_an_unfinished_data_set_is_resumed_without_its_failed_samples(tmp_path: 
 
 
 def test_repair_tries_failed_samples_again(tmp_path: Path) -> None:
-    """What still fails keeps its bytes; if all can be made now, the data set is whole."""
+    """Samples that still fail keep their bytes; if all succeed, the data set is complete."""
     whole, lacking, trouble = tmp_path / "whole", tmp_path / "lacking", Trouble(bug_at=5)
     make(whole)
     make(lacking, trouble=trouble, settings=SKIP)

@@ -27,7 +27,7 @@ def gather(parts: list[Path], out: Path, allow_mixed_numerics: bool = False) -> 
 
 
 def test_a_part_holds_its_shards_and_is_no_data_set_and_ranges_are_checked(tmp_path: Path) -> None:
-    """Its summary says what is left; the same command later changes nothing."""
+    """Its summary states the remaining work; the same command later changes nothing."""
     settings = Settings(shards=range(4, 6), write_media=write_raw_images)
     for made in (3, 0):
         summary = make(tmp_path / "out", N, SHARD_SIZE, settings=settings)
@@ -65,7 +65,7 @@ def test_the_last_missing_part_finishes_the_data_set(tmp_path: Path) -> None:
     ids=["two", "in any order", "overlapping", "with a gap"],
 )  # fmt: skip
 def test_merged_parts_equal_one_run(tmp_path: Path, ranges: list[range]) -> None:
-    """Byte for byte; what no part has is generated, and the parts stay."""
+    """Byte for byte; missing shards are generated, and the parts stay."""
     parts = [make_part(tmp_path / f"part-{k}", shards) for k, shards in enumerate(ranges)]
     before = [tree_digest(part) for part in parts]
     gather(parts, tmp_path / "out")

@@ -33,7 +33,7 @@ def make_job(out: Path, allow: bool = False) -> Job:
 
 
 def test_a_machine_that_computes_differently_is_refused_by_name_or_recorded(tmp_path: Path) -> None:
-    """The message names what differs and the way out; equal machines are admitted."""
+    """The message names the difference and the remedy; equal machines are admitted."""
     job = make_job(tmp_path / "out")
     admit_numerics(job, Machine("cpu"))
     admit_numerics(job, Machine("cpu"))

@@ -1,4 +1,4 @@
-"""Data sets at URLs: a real S3 server in a process of its own, and storage in memory."""
+"""Data sets at URLs: a real S3 server in a separate process, and storage in memory."""
 
 import os
 import signal

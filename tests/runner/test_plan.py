@@ -1,4 +1,4 @@
-"""The plan: what identifies a data set, and how it is cut into shards."""
+"""The plan: identity of a data set, and its division into shards."""
 
 from dataclasses import replace
 from pathlib import Path

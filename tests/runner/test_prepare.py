@@ -26,7 +26,7 @@ annotations: [boxes2d, boxes3d]
 
 @dataclass(frozen=True)
 class Preparation:
-    """What was prepared in a cache folder of its own, and what was announced."""
+    """Prepared assets in a separate cache folder, and the announcements."""
 
     factory: PipelineFactory
     cache: Path

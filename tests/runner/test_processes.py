@@ -20,7 +20,7 @@ from tests.runner.doubles import RESUME, Trouble, make, notes_of, tree_digest, w
 
 ROOT = Path(__file__).parents[2]
 HANG_S = 120.0
-"""Patience with what takes a second on an idle machine; only what hangs takes longer."""
+"""Time limit for steps that take a second on an idle machine; only hanging ones exceed it."""
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def committed(out: Path) -> int:
 
 @pytest.mark.slow
 def test_a_killed_workers_shard_is_made_again(tmp_path: Path, reference_digest: str) -> None:
-    """One SIGKILL at sample 5: the same bytes, and the log says what happened."""
+    """One SIGKILL at sample 5: the same bytes, and the log reports it."""
     trouble = Trouble(killed_once_at=5, marker=str(tmp_path / "marker"))
     summary = make(tmp_path / "out", workers=2, trouble=trouble)
     assert summary.worker_deaths == 1
@@ -114,7 +114,7 @@ def test_a_hanging_worker_is_killed_and_replaced(tmp_path: Path, reference_diges
 
 @pytest.mark.slow
 def test_killed_workers_leave_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What engines put into temporary folders goes with the run, under a name of any length."""
+    """Temporary files of engines are removed with the run, under a name of any length."""
     elsewhere = tmp_path / "temporary"
     elsewhere.mkdir()
     monkeypatch.setenv("TMPDIR", str(elsewhere))
@@ -147,7 +147,7 @@ def test_a_bug_is_one_message_with_place_trace_and_command(tmp_path: Path, worke
 
 
 def test_a_wrong_sample_is_named_with_the_command_that_makes_it(tmp_path: Path) -> None:
-    """The pipeline knows what is wrong; the runner knows where."""
+    """The pipeline names the fault; the runner adds the place."""
     with pytest.raises(SampleError) as caught:
         make(tmp_path / "out", workers=1, trouble=Trouble(wrong_at=6))
     assert str(caught.value) == (
@@ -195,7 +195,7 @@ def test_handlers_of_signals_are_given_back_and_threads_leave_them_alone(tmp_pat
     thread.join()
     assert signal.getsignal(signal.SIGINT) is before
     assert (tmp_path / "out/manifest.json").exists()
-    # After a run, Ctrl-C means what it meant before.
+    # After a run, Ctrl-C has its earlier meaning.
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     make(tmp_path / "again")
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
@@ -221,7 +221,7 @@ def test_errors_that_travel_from_workers_are_named_with_their_remedy() -> None:
         assert type(sent) is OutOfMemory
         assert str(sent).startswith("a worker could not start: out of memory")
         assert "\n" not in str(sent)
-    # What cannot travel arrives as its nearest relative.
+    # Errors that cannot be pickled arrive as their nearest base class.
     arrived = make_sendable(Stubborn())
     assert type(arrived) is SampleError
     assert str(arrived).startswith("scene 3: no valid layout")

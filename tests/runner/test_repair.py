@@ -38,7 +38,7 @@ def files_of(root: Path) -> list[Path]:
 def flip(path: Path, bit: int) -> None:
     data = bytearray(path.read_bytes())
     data[bit // 8 % len(data)] ^= 1 << bit % 8
-    # A new file: hard links must not spread the damage, so that each one counts as one.
+    # A new file: hard links must not spread the damage, and each one counts once.
     path.unlink()
     path.write_bytes(data)
 
@@ -115,7 +115,7 @@ def test_every_damage_is_found_and_repaired(dataset: Path, rounds: int) -> None:
 def test_a_damaged_shard_is_made_again_without_the_option(
     dataset: Path, damage: Callable[[Path, int], None], name: str
 ) -> None:
-    """The same command hashes what it finds; extra files count in unfinished data sets."""
+    """The same command hashes existing files; extra files count in unfinished data sets."""
     before, path = tree_digest(dataset), dataset / "shards" / name
     if damage is add_file:
         (dataset / "manifest.json").unlink()
@@ -129,7 +129,7 @@ def test_a_damaged_shard_is_made_again_without_the_option(
 
 
 def test_damage_of_an_unfinished_data_set_is_not_sealed(dataset: Path) -> None:
-    """Resumption hashes what it did not generate itself; the log names the shard."""
+    """Resumption hashes shards of earlier runs; the log names the shard."""
     before = tree_digest(dataset)
     (dataset / "manifest.json").unlink()
     (dataset / "SHA256SUMS").unlink()
@@ -143,7 +143,7 @@ def test_damage_of_an_unfinished_data_set_is_not_sealed(dataset: Path) -> None:
 
 
 def test_a_changed_digest_in_a_record_is_not_sealed(dataset: Path) -> None:
-    """The record no longer matches its own checksum, so that nothing relies on it."""
+    """The record no longer matches its own checksum: nothing relies on it."""
     before = tree_digest(dataset)
     record = dataset / "shards/000001.json"
     text = record.read_text()

@@ -97,7 +97,7 @@ print((private_bytes() - before) / HEAP_GROWTH_BYTES)
 def test_the_heap_is_trimmed_once_it_has_grown_by_the_threshold() -> None:
     """Blocks below one still in use stay in the heap when they are freed, until it is trimmed.
 
-    In a process of its own, whose heap has no gaps yet.
+    In a separate process, whose heap has no gaps yet.
     """
     done = subprocess.run(
         [sys.executable, "-c", FILL_AND_TRIM], capture_output=True, text=True, check=True

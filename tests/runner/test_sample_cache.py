@@ -128,7 +128,7 @@ def test_a_killed_writer_leaves_no_sample_and_its_rest_is_removed_first(folder: 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="permits no removal of open files")
 def test_processes_share_the_folder(folder: Path) -> None:
-    """Three processes fill and read it, while samples are removed; each reads what was made."""
+    """Three processes fill and read it, while samples are removed; each reads the right bytes."""
     cache = open_cache(folder, 20 * KILOBYTE)
     script = (
         "import sys; from pathlib import Path\n"

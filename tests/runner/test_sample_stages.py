@@ -110,7 +110,7 @@ def test_other_bytes_for_the_same_pixels_are_a_matter_of_the_encoder(tmp_path: P
 
 
 def test_data_sets_are_compared_by_plan_sample_and_export(tmp_path: Path) -> None:
-    """The difference of the plans comes first, then that of the first sample."""
+    """The difference of the plans comes first, then the first sample's."""
     make(tmp_path / "one", settings=Settings())
     make(tmp_path / "two", shard_size=3, settings=Settings())
     assert compare(tmp_path / "one", tmp_path / "one").equal

@@ -77,7 +77,7 @@ def start(body: str, folder: Path) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_lets_a_command_clean_up(tmp_path: Path, number: signal.Signals) -> None:
-    """Exit code 130, one line, and what the command does at its end is done."""
+    """Exit code 130, one line, and the command's final steps are done."""
     process = start(SLEEPS, tmp_path)
     process.send_signal(number)
     printed, message = process.communicate(timeout=HANG_S)
@@ -104,7 +104,7 @@ def test_a_signal_without_effect_ends_the_process_all_the_same(
     "error", ["MemoryError", "ImportError('x.so: failed to map segment from shared object')"]
 )
 def test_lack_of_memory_is_one_line(tmp_path: Path, error: str) -> None:
-    """Under ``ulimit -v``, libraries cannot even be loaded; a traceback tells nothing."""
+    """Under ``ulimit -v``, libraries cannot even be loaded; a traceback would not help."""
     process = start(f"\n    begun()\n    raise {error}\n", tmp_path)
     message = process.communicate(timeout=HANG_S)[1]
     assert process.returncode == 6

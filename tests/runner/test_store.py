@@ -103,7 +103,7 @@ def test_manifest_and_provenance_count_and_list_the_samples(finished: Path) -> N
 
 
 def test_views_keep_what_differs_and_read_back_complete(tmp_path: Path) -> None:
-    """The second line of a scene has no field that the first line says already."""
+    """The second line of a scene repeats no field of the first line."""
     one = Scene("test", bodies=(Body("a", "mug"),))
     other = replace(one, cameras=(Camera("c", SE3(), Intrinsics.from_hfov(64, 48, 1.0)),))
     first, second = (
@@ -146,7 +146,7 @@ def test_exporters_see_no_pixels(tmp_path: Path) -> None:
 
 
 def test_a_finished_data_set_is_left_alone(tmp_path: Path) -> None:
-    """The same command again makes nothing, changes nothing, and says so."""
+    """The same command again makes nothing, changes nothing, and reports it."""
     doubles.make(tmp_path / "out")
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").rglob("*") if "run" not in str(p)}
     summary = doubles.make(tmp_path / "out")
@@ -474,7 +474,7 @@ def test_a_plan_is_the_first_file_there(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_tree_sizes_reports_links_as_irregular(tmp_path: Path) -> None:
-    """A symbolic link, to a file or to a folder, is no content."""
+    """A symbolic link, to a file or to a folder, does not count as content."""
     (tmp_path / "a").write_text("abc")
     (tmp_path / "b").symlink_to("a")
     (tmp_path / "c").symlink_to(tmp_path, target_is_directory=True)

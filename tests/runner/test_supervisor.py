@@ -70,7 +70,7 @@ def test_a_shard_that_kills_three_workers_is_given_up_and_named() -> None:
 
 
 def test_a_silent_worker_is_killed_and_its_shard_made_by_another_unless_it_is_done() -> None:
-    """After the limit and not before; waiting for work is no silence."""
+    """After the limit and not before; waiting for work does not count as silence."""
     supervisor = make_supervisor(shards=1, workers=1, silence_s=30.0)
     supervisor.start(0.0)
     supervisor.handle(events.Ready(0), 10.0)

@@ -27,7 +27,8 @@ if any("gen_data.runner.worker" in a for a in sys.orig_argv):
     else:
         {action}
 """
-"""A ``sitecustomize`` module: Python runs it before any code of ours, here in the first worker."""
+"""A ``sitecustomize`` module: Python runs it before this project's code, here in the first
+worker."""
 
 SIGNALS_AT_BIRTH = {
     "ctrl-c": "os.killpg(os.getpgrp(), signal.SIGINT)",
@@ -48,7 +49,7 @@ def with_action_at_birth(folder: Path, action: str) -> Mapping[str, str]:
 
 
 def finish(process: subprocess.Popen[str]) -> str:
-    """What a run prints until its end; a run that does not end is killed and fails the test."""
+    """Output of a run until its end; a run that does not end is killed and fails the test."""
     try:
         return process.communicate(timeout=HANG_S)[1]
     except subprocess.TimeoutExpired:

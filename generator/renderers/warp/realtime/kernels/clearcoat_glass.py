@@ -2,15 +2,15 @@
 
 Only pixels that show such a surface are shaded here, and only scenes with one load this module. A
 pixel's own light is computed as in
-gen_data.renderers.warp.realtime.kernels.lattice_lighting; up to three rays add
-reflections and what lies behind.
+gen_data.renderers.warp.realtime.kernels.lattice_lighting; up to three rays add reflections and the
+view behind.
 
-* A **clear coat** is a second GGX layer of reflectance 0.04; what it reflects is subtracted from
+* A **clear coat** is a second GGX layer of reflectance 0.04; its reflection is subtracted from
   all layers below (KHR_materials_clearcoat; Filament, "Physically based rendering", 4.9). It is
   smooth over the bumps of the base.
 * **Glass** reflects by Fresnel's equations. A thin pane transmits the rest without bending it, all
-  inter-reflections summed, and tints it once; a solid refracts, and its surface tints what enters
-  and what leaves by the square root of its colour.
+  inter-reflections summed, and tints it once; a solid refracts, and its surface tints entering and
+  leaving light by the square root of its colour.
 * **Mirrors**, that is metals, coats and glass of a roughness below MIRROR_ROUGHNESS, reflect the
   scene by one ray, shaded at its end with lamps, their shadows and the environment; reflections in
   that surface show the environment. Rougher ones reflect the environment alone.
@@ -52,7 +52,7 @@ FAINT_SHARE = wp.constant(1.0 / 256.0)
 MOSTLY_CLEAR = wp.constant(0.9)
 # Neighbours on a layered surface with more contrast than this are supersampled.
 CONTRAST = wp.constant(0.15)
-# Pixels with more of it take both further samples: beside a lamp or a window, whose luminance is
+# Pixels with more of it take both further samples: next to a lamp or a window, whose luminance is
 # tens of times larger, neighbours that take different ones would be white and dark in turn.
 STARK_CONTRAST = wp.constant(0.5)
 # Limit on the clear surfaces along one ray.
@@ -196,7 +196,7 @@ def curvature(world: records.World, hit: wp.vec2i):
 @wp.func
 def lift_over_horizon(r: wp.vec3, n: wp.vec3):
     """Lift a reflected direction that bumps have turned below the surface."""
-    # At least about one degree above the horizon, so that the ray leaves the surface.
+    # At least about one degree above the horizon: the ray must leave the surface.
     return records.fast_normalize(r + n * wp.max(0.02 - wp.dot(r, n), 0.0))
 
 
@@ -232,7 +232,7 @@ def find_visible_lamps(
     """Visible fractions of the lamps that matter at the end of a ray, into ``probe.lit``.
 
     Args:
-        origin: Of rays from there.
+        origin: Origin of rays from there.
         side: As for light_at.
         share: As for light_at_hit.
     """
@@ -388,7 +388,7 @@ def radiance_along(
     sample: int,
     k: int,
 ):
-    """Weighted radiance along a ray, including what lies behind clear surfaces."""
+    """Weighted radiance along a ray, including surfaces behind clear ones."""
     total = wp.vec3(0.0)
     surfaces = int(0)
     going = bool(True)
@@ -412,8 +412,8 @@ def radiance_along(
                 material = ground_weathering.apply_coat(world, surface, material, coat, n)
             clear = world.surfaces[surface].transmission * (1.0 - material.metallic)
             opacity = world.surfaces[surface].opacity
-            # Inside a solid only the transmitted ray counts: the back of its surface has no light
-            # of its own.
+            # Inside a solid only the transmitted ray counts: the back of its surface reflects no
+            # light.
             if clear == 0.0 or m.entering != 0 or world.surfaces[surface].thin != 0:
                 share = wp.max(ray.share)
                 light = light_at_hit(
@@ -706,7 +706,7 @@ def contrast(a: wp.vec3, b: wp.vec3):
 def contrast_around(
     view: records.View, images: records.GBufferRecord, radiance: wp.array[wp.vec3], i: int
 ):
-    """Largest contrast between a pixel and the four beside it that show the same body."""
+    """Largest contrast between a pixel and its four neighbours that show the same body."""
     x = i % view.width
     y = i / view.width
     largest = float(0.0)
@@ -765,9 +765,9 @@ def shade_contrasts(
         offsets: Two positions within a pixel, [0, 1); neighbours take one of them in turn, or both
             where contrasts are stark, and in means of tones.
         white, brightest: As for msaa.mix_samples.
-        radiance: Of the centres.
+        radiance: Radiance of the centres.
         pixels: The pixels.
-        mixed: In their order.
+        mixed: Result, in their order.
     """
     place = wp.tid()
     k = places[place]

@@ -8,7 +8,7 @@
    Heidrich, 2001).
 3. Where a whole neighbourhood agrees, its value is final. In penumbrae, points trace further rays,
    and sixteen neighbours on one surface are averaged, rows first: together they sample all parts of
-   the lamp from every position, so that no pattern remains.
+   the lamp from every position, and no pattern remains.
 """
 
 import warp as wp
@@ -156,7 +156,7 @@ def agreed_value(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y:
 
 @wp.func
 def lamp_weight(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, side: wp.vec3):
-    """Unshadowed illuminance by a lamp that tells how much it matters [lx]; UNSEEN behind surfaces.
+    """Unshadowed illuminance by a lamp, for its share of the light [lx]; UNSEEN behind surfaces.
 
     Args:
         side: Direction away from a translucent surface, lamps behind which count like those before
@@ -205,7 +205,7 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matte
 
 @wp.func
 def mean_of_neighbours(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y: int):
-    """Mean of the known values beside, above and below a point on its material; else UNSEEN."""
+    """Mean of the known values of a point's four neighbours on its material; else UNSEEN."""
     i = y * lattice.width + x
     total = float(0.0)
     found = float(0.0)
@@ -417,10 +417,10 @@ def sum_row(
     j: int,
     sums: wp.array3d[wp.float32],
 ):
-    """Sum and number of the values beside points on their own surface, for neighbours in a row.
+    """Sum and number of the values next to points on their own surface, for neighbours in a row.
 
     Args:
-        tolerance: Allowed distance from a point's tangent plane over its distance from the eye.
+        tolerance: Allowed distance from a point's tangent plane as a share of its eye distance.
         x, y: The first of eight points; of one on CUDA.
         sums: [light, sum or number, point].
     """
@@ -457,7 +457,7 @@ def sum_rows(
     values: wp.array2d[float],
     sums: wp.array3d[float],
 ):
-    """Sum and number of the values beside each point on its own surface.
+    """Sum and number of the values next to each point on its own surface.
 
     Skipped where all values around agree, which need no sums.
 

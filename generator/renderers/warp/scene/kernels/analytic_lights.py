@@ -72,7 +72,7 @@ class Beam:
 def dipped_share(lamp: LightRecord, d: wp.vec3):
     """Intensity of a dipped headlight in a direction, relative to its maximum."""
     right = fast_normalize(wp.cross(lamp.direction, wp.vec3(0.0, 0.0, 1.0)))
-    # Slopes diverge beside and behind the lamp: clamped, they end in the stray light.
+    # Slopes diverge at the sides of and behind the lamp: clamped, they end in the stray light.
     ahead = wp.max(wp.dot(d, lamp.direction), 1.0e-3)
     side = wp.dot(d, right) / ahead
     down = -wp.dot(d, wp.cross(right, lamp.direction)) / ahead

@@ -150,10 +150,10 @@ def weigh_texels(
 ):
     """Weights of an environment's texels in the GGX lobe around each direction of a map.
 
-    The lobe is that of a surface viewed head-on, weighted by the cosine to the light (Karis 2013).
+    The lobe of a surface viewed head-on, weighted by the cosine to the light (Karis 2013).
 
     Args:
-        directions, solid_angles: Of the environment's texels.
+        directions, solid_angles: Directions and solid angles of the environment's texels.
         size: Texels along the octahedral map's edge, without its border.
         shares: By groups of eight texels of the map, texels of the environment, and lanes.
     """
