@@ -498,7 +498,7 @@ def _plugin(
     name = default if tag is None else tag.content
     where = (tag or node).position
     if not isinstance(name, str):
-        fact = f"expected a {table.kind}: one of {', '.join(table)}"
+        fact = f"expected one {table.kind} of: {', '.join(table)}"
         problems.add(where, f"{field}.{table.tag}", fact)
         return None
     try:
