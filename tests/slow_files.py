@@ -2,9 +2,11 @@
 
 All slow tests together take longer than CI has. It runs a fifth of their files, which the commit
 decides, and all that changed within three hours of it: those of the same piece of work. So a file
-runs with each change of it, and else in every fifth run. ``python -m pytest -m slow`` runs all.
+runs with each change of its statements, and else in every fifth run. ``python -m pytest -m slow``
+runs all.
 """
 
+import ast
 import re
 import subprocess
 import zlib
@@ -31,10 +33,40 @@ def choose(files: Iterable[str], changed: Iterable[str], commit: str) -> list[st
 
 
 def changed_files(root: Path) -> list[str]:
-    """Files that commits of the last hours before HEAD's changed, from the root."""
+    """Files that commits of the last hours before HEAD's changed, from the root.
+
+    Files of Python whose comments and docstrings alone changed are left out.
+    """
     at_s = int(_git(root, "log", "-1", "--format=%ct"))
     since = f"--since={at_s - RECENT_S}"
-    return _git(root, "log", since, "--name-only", "--format=", "HEAD").split()
+    names = set(_git(root, "log", since, "--name-only", "--format=", "HEAD").split())
+    before = _git(root, "rev-list", "-1", f"--before={at_s - RECENT_S}", "HEAD").strip()
+    if before:
+        names &= set(_git(root, "diff", "--name-only", before, "HEAD").split())
+    return [name for name in names if not (before and _has_equal_statements(root, before, name))]
+
+
+def _has_equal_statements(root: Path, before: str, name: str) -> bool:
+    """Whether a file of Python differs from an older commit's in comments and docstrings only."""
+    if not name.endswith(".py"):
+        return False
+    try:
+        old, new = (_git(root, "show", f"{commit}:{name}") for commit in (before, "HEAD"))
+    except subprocess.CalledProcessError:
+        return False  # It is new, or gone.
+    return _statements(old) == _statements(new)
+
+
+def _statements(text: str) -> str:
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            node.body = [s for s in node.body if not _is_text(s)]
+    return ast.dump(tree)
+
+
+def _is_text(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def _git(root: Path, *arguments: str) -> str:
