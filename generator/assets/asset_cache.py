@@ -39,7 +39,8 @@ Arrays = dict[str, NDArray[Any]]
 FORMAT = 3
 """Increased whenever the same sources are stored as different arrays."""
 # Small, since renderers and physics engines keep their own copies.
-_MEMORY_BYTES = 24 * 1024 * 1024
+_MEMORY_BYTES = 12 * 1024 * 1024
+"""Of results that are stored, and as much of others, which their scene alone has."""
 _RESULTS = 1024
 """Results kept in memory, a few kilobytes each in addition to their arrays."""
 _PREFIX = struct.Struct("<II")
@@ -129,6 +130,7 @@ class Store:
     def __init__(self, disk: DiskCache, max_bytes: int = _MEMORY_BYTES) -> None:
         self._disk = disk
         self._memory: ByteCache[_CachedValue] = ByteCache(max_bytes, _RESULTS)
+        self._passing: ByteCache[_CachedValue] = ByteCache(max_bytes, _RESULTS)
 
     def get(self, key: str, compute: Callable[[], Arrays], view: Callable[[Arrays], T]) -> T:
         """Look up or compute a result.
@@ -153,12 +155,12 @@ class Store:
             value = compute()
             return _CachedValue(value, value.nbytes)
 
-        value: S = self._memory.get(key, make).value
+        value: S = self._passing.get(key, make).value
         return value
 
     def __len__(self) -> int:
         """Number of results in memory."""
-        return len(self._memory)
+        return len(self._memory) + len(self._passing)
 
 
 def encode_arrays(key: str, arrays: Arrays) -> bytes:

@@ -62,8 +62,20 @@ def _is_mapped(array: Any) -> bool:
 
 def release_mapped_pages() -> None:
     """Drop the pages of all maps from this process; they come back when they are read."""
-    for address, length in list(_mapped.items()):
+    for address, length in _joined(sorted(_mapped.items())):
         drop_pages(address, length)
+
+
+def _joined(maps: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Addresses and lengths of maps, neighbours as one: there are a thousand of them."""
+    joined: list[tuple[int, int]] = []
+    for address, length in maps:
+        start, before = joined[-1] if joined else (0, 0)
+        if start + before == address:
+            joined[-1] = start, before + length
+        else:
+            joined.append((address, length))
+    return joined
 
 
 def drop_pages(address: int, length: int) -> None:

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.decimals import round_near
+
 Vec3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Array = NDArray[np.float64]
@@ -91,11 +93,21 @@ class SE3:
         """The pose on a decimal grid, re-normalised, to pass from physics to labels."""
         tx, ty, tz = self.translation_m
         w, x, y, z = self.quaternion_wxyz
-        fine = decimals + 2
+        steps, fine = 10.0**decimals, decimals + 2
+        fine_steps = 100.0 * steps
         # Number by number, as all of this class: a scene composes and rounds thousands of poses.
         return SE3(
-            (round(tx, decimals) + 0.0, round(ty, decimals) + 0.0, round(tz, decimals) + 0.0),
-            _normalised(round(w, fine), round(x, fine), round(y, fine), round(z, fine)),
+            (
+                round_near(tx, steps, decimals) + 0.0,
+                round_near(ty, steps, decimals) + 0.0,
+                round_near(tz, steps, decimals) + 0.0,
+            ),
+            _normalised(
+                round_near(w, fine_steps, fine),
+                round_near(x, fine_steps, fine),
+                round_near(y, fine_steps, fine),
+                round_near(z, fine_steps, fine),
+            ),
         )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from gen_data.core import asset_types, scene_time
 from gen_data.core.bounded_cache import CountCache, ObjectCache
+from gen_data.core.decimals import round_near
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.scene import PERSON_MARGIN_M, Body, Box3dExtent, Instance, Scene
 from gen_data.core.se3 import SE3, Array, Vec3
@@ -150,7 +151,8 @@ def _labelled_bounds(
 
 def _scale(corner_m: Vec3, scale: float) -> Vec3:
     x, y, z = corner_m
-    return (round(x * scale, 6), round(y * scale, 6), round(z * scale, 6))
+    x, y, z = x * scale, y * scale, z * scale
+    return (round_near(x, 1e6, 6), round_near(y, 1e6, 6), round_near(z, 1e6, 6))
 
 
 def _round_to_micrometre(corner_m: Array) -> Vec3:

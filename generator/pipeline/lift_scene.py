@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.assets import asset_ids, drape, families
-from gen_data.core import asset_types, lane_geometry, motion, scene_time
+from gen_data.core import asset_types, decimals, lane_geometry, motion, scene_time
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.relief import CELL_M, Relief
 from gen_data.core.scene import Body, Camera, Lane, Light, Scene
@@ -395,7 +395,7 @@ def _lifted_lane(
     if is_twisted:
         twisted = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(banks)))])
         given[1:] |= np.diff(np.floor(twisted / _TURN)) > 0.0
-    center = [(round(x, 6), round(y, 6), round(z, 6)) for x, y, z in points[given].tolist()]
+    center = [(x, y, z) for x, y, z in decimals.round_rows(points[given], 6)]
     given_banks = np.round(banks[given], 9) + 0.0
     return replace(
         lane,

@@ -1,7 +1,8 @@
 """Lanes of roads, and the links between them."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -134,9 +135,11 @@ def stations(start_m: float, end_m: float, step_m: float) -> Array:
 
 def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
     """Set the successors of lanes: lanes that start at a lane's end, in its direction."""
-    starts = [
-        (lane.name, lane.kind, lane.center_m[0], _heading(lane.center_m, 0)) for lane in lanes
-    ]
+    # By kind and cell: a hundred lanes have ten thousand pairs of ends and starts.
+    starts = defaultdict(list)
+    for lane in lanes:
+        start = lane.name, lane.center_m[0], _heading(lane.center_m, 0)
+        starts[(lane.kind, *_cell(lane.center_m[0]))].append(start)
     linked = ((lane, tuple(_find_successors(lane, starts))) for lane in lanes)
     # A lane is measured once, as long as it is the same object.
     return tuple(
@@ -145,13 +148,24 @@ def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
     )
 
 
-def _find_successors(lane: Lane, starts: Iterable[tuple[str, LaneKind, Vec3, float]]) -> list[str]:
+_Starts = Mapping[tuple[LaneKind, int, int], Sequence[tuple[str, Vec3, float]]]
+"""Names, first points and directions of lanes by kind and cell of the first point."""
+
+
+def _cell(place_m: Vec3) -> tuple[int, int]:
+    """The square metre of the world around a place."""
+    return math.floor(place_m[0]), math.floor(place_m[1])
+
+
+def _find_successors(lane: Lane, starts: _Starts) -> list[str]:
     end, heading = lane.center_m[-1], _heading(lane.center_m, -2)
+    i, j = _cell(end)
     found = {
         name
-        for name, kind, start, direction in starts
-        if kind == lane.kind
-        and name != lane.name
+        for x in (i - 1, i, i + 1)
+        for y in (j - 1, j, j + 1)
+        for name, start, direction in starts.get((lane.kind, x, y), ())
+        if name != lane.name
         and math.dist(end, start) < MEETING_M
         and abs(math.remainder(direction - heading, math.tau)) < MEETING_RAD
     }

@@ -77,6 +77,21 @@ def test_pages_are_dropped_and_come_back(tmp_path: Path) -> None:
     assert view.tobytes() == content
 
 
+def test_pages_of_files_next_to_each_other_are_dropped(tmp_path: Path) -> None:
+    """Every other one is unmapped before: maps are neighbours of maps, and of gaps."""
+    contents = [write(tmp_path / f"{k}", 1 << 20) for k in range(16)]
+    views = [np.frombuffer(mapped(tmp_path / f"{k}"), np.uint8) for k in range(16)]
+    del views[4:12:2], contents[4:12:2]
+    gc.collect()
+    assert [int(view.sum()) for view in views] == [sum(content) for content in contents]
+    resident = mapped_files.read_statm(2)
+
+    mapped_files.release_mapped_pages()
+
+    assert mapped_files.read_statm(2) < resident - (11 << 20)
+    assert [view.tobytes() for view in views] == contents
+
+
 def test_pages_are_dropped_once_enough_were_read(tmp_path: Path) -> None:
     """Pages that were resident before do not count."""
     write(tmp_path / "file", 8 << 20)

@@ -15,6 +15,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Light, Scene, Weather
 from gen_data.renderers.warp import device, settings
 from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene import device_cache
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_world
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh
@@ -114,7 +115,25 @@ class StoringLibrary(FakeLibrary):
         return self.stored[asset_id, name]
 
     def is_stored(self, asset_id: str) -> bool:
-        return asset_id in self.meshes
+        return not asset_id.startswith("road")
+
+
+def test_meshes_of_one_scene_do_not_drive_out_those_that_scenes_share(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Caches hold at least one mesh, however little memory they have."""
+    monkeypatch.setattr(device_cache, "_OWN_MESH_BYTES", 1)
+    library = StoringLibrary()
+    library.meshes |= {"road 1": plane_mesh(9.0), "road 2": plane_mesh(8.0)}
+    cache = DeviceCache(library, device.open_device("cpu"))
+    shared, road = cache.mesh("box"), cache.mesh("road 1")
+
+    cache.mesh("road 2")
+
+    assert cache.mesh("box") is shared
+    assert cache.mesh("road 1") is not road
+    cache.mesh("floor")
+    assert cache.mesh("box") is not shared
 
 
 def test_stored_hierarchies_and_mip_levels_give_the_same_image() -> None:

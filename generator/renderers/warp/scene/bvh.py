@@ -9,6 +9,7 @@ A tree is one array of floats, in groups of eight; integers are stored by their 
   likewise; and the numbers of the faces.
 """
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from gen_data.renderers.warp.scene.kernels import box_groups, bvh_build
 
 _WIDTH = 8
 _NODE_GROUPS, _LEAF_GROUPS = 7, 10
+
+_SCALARS = (wp.int32, wp.uint32, wp.float32)
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -36,8 +39,8 @@ def mesh_tree(
 ) -> Floats:
     """Tree over a mesh's faces, given their boxes; missing triangles of a leaf are points.
 
-    A ``quick`` one is made in a fifth of the time, for meshes of a single scene; rays through it
-    take longer.
+    A ``quick`` one is made in a fraction of the time, for meshes of a single scene; its boxes
+    overlap more.
     """
     boxes, nodes, codes, leaves = _grow(lows_m, highs_m, _WIDTH, quick=quick)
     leaf_groups = np.zeros((len(leaves), _LEAF_GROUPS, _WIDTH), np.float32)
@@ -96,14 +99,47 @@ def _grow(
     boxes[:, :3], boxes[:, 4:7] = lows, -highs
     # Numbers up to 2**24 are exact.
     boxes[:, 3] = np.arange(n)
+    cells = np.zeros(0, np.uint32)
+    if quick:
+        cells, order = _morton_order(lows, highs)
+        boxes = boxes.take(order, axis=0)
     outputs = [_wrap(nodes, wp.float32), _wrap(codes, wp.int32), _wrap(leaves, wp.vec2i)]
     outputs.append(_wrap(counts, wp.int32))
-    given = [_wrap(boxes, wp.float32), leaf, int(quick)]
+    given = [_wrap(boxes, wp.float32), leaf, _wrap(cells, wp.uint32)]
     wp.launch(bvh_build.grow_tree, 1, given, outputs, device="cpu")
     return boxes, nodes[: counts[0]], codes[: counts[0]], leaves[: counts[1]]
 
 
+def _morton_order(lows: Floats, highs: Floats) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
+    """Codes [n] of the cells of boxes' centres, rising, and the numbers [n] of these boxes.
+
+    Cells are cubes: 1,024 along the longest side.
+    """
+    # Column by column: numpy is slow on the short axis of [n, 3].
+    centres = [low + high for low, high in zip(lows.T, highs.T, strict=True)]
+    starts = [float(centre.min()) for centre in centres]
+    widest = max(float(c.max()) - start for c, start in zip(centres, starts, strict=True))
+    scale = np.float32(1023.0 / max(widest, 1e-30))
+    code = np.zeros(len(lows), np.uint32)
+    for axis, (centre, start) in enumerate(zip(centres, starts, strict=True)):
+        cell = np.minimum((centre - np.float32(start)) * scale, np.float32(1023.0))
+        code |= _spread_bits()[axis].take(cell.astype(np.int32))
+    # NumPy sorts numbers of 16 bits ten times as fast.
+    order = np.argsort(code.astype(np.uint16), kind="stable")
+    high = (code >> 16).astype(np.uint16).take(order)
+    order = order.take(np.argsort(high, kind="stable"))
+    return code.take(order), order
+
+
+@cache
+def _spread_bits() -> NDArray[np.uint32]:
+    """Numbers below 1,024 with two zeros between their bits, moved by 0, 1 and 2 bits [3, 1024]."""
+    numbers = np.arange(1024)
+    spread = sum(((numbers >> k) & 1) << (3 * k) for k in range(10))
+    return np.stack([spread << axis for axis in range(3)]).astype(np.uint32)
+
+
 def _wrap(values: NDArray[np.generic], dtype: Any) -> wp.array:
     """Wrap a host array for kernels on the CPU without a copy; it must outlive them."""
-    shape = values.shape if dtype in (wp.int32, wp.float32) else values.shape[:-1]
+    shape = values.shape if dtype in _SCALARS else values.shape[:-1]
     return wp.array(ptr=values.ctypes.data, dtype=dtype, shape=shape, device="cpu")

@@ -15,10 +15,13 @@ from gen_data.renderers.warp.scene import brdf_albedo_lut, device_assets, enviro
 from gen_data.renderers.warp.scene.distortion_lut import DeviceOptics, upload_optics
 from gen_data.renderers.warp.scene.struct_dtypes import to_device
 
-_MESH_BYTES, _TEXTURE_BYTES = 176 << 20, 384 << 20
+_MESH_BYTES, _TEXTURE_BYTES = 88 << 20, 192 << 20
 """Of a GPU."""
-_OWN_MESH_BYTES, _OWN_TEXTURE_BYTES = 48 << 20, 16 << 20
-"""On the CPU, where most are views of files and take no memory that could not be dropped."""
+_OWN_MESH_BYTES, _OWN_TEXTURE_BYTES = 24 << 20, 8 << 20
+"""On the CPU, where most are views of files and take no memory that could not be dropped.
+
+There is as much for meshes and textures that are not stored, such as roads: their scene alone has
+them, and in one cache they would drive out all others."""
 _MESHES, _TEXTURES = 4096, 2048
 """Some kilobytes each beside their arrays, and up to two maps of files."""
 _ENVIRONMENT_BYTES = 32 << 20
@@ -87,6 +90,10 @@ class DeviceCache:
         texture_bytes = _OWN_TEXTURE_BYTES if device.is_cpu else _TEXTURE_BYTES
         self._meshes: ByteCache[device_assets.DeviceMesh] = ByteCache(mesh_bytes, _MESHES)
         self._textures: ByteCache[device_assets.DeviceTexture] = ByteCache(texture_bytes, _TEXTURES)
+        self._passing_meshes: ByteCache[device_assets.DeviceMesh] = ByteCache(mesh_bytes, _MESHES)
+        self._passing_textures: ByteCache[device_assets.DeviceTexture] = ByteCache(
+            texture_bytes, _TEXTURES
+        )
         self._environments: ByteCache[environment_maps.DeviceEnvironment] = ByteCache(
             _ENVIRONMENT_BYTES
         )
@@ -102,13 +109,13 @@ class DeviceCache:
 
     def mesh(self, asset_id: str) -> device_assets.DeviceMesh:
         """Geometry of an asset on the device."""
+        lasts = self._lasts(asset_id)
 
         def make() -> device_assets.DeviceMesh:
             data = self.assets.mesh(asset_id)
             # The sizes, too: a tree of another mesh would lead rays out of its arrays, if somebody
             # changed a family and not its version.
             sizes = f"{len(data.vertices_m)} {len(data.faces)}"
-            lasts = self._store is None or self._store.is_stored(asset_id)
             prepared = self._derived(
                 asset_id,
                 f"device mesh {sizes}",
@@ -116,7 +123,7 @@ class DeviceCache:
             )
             return device_assets.upload_mesh(data, prepared, self.device)
 
-        return self._meshes.get(asset_id, make)
+        return (self._meshes if lasts else self._passing_meshes).get(asset_id, make)
 
     def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         """An asset's own materials, one per slot."""
@@ -133,7 +140,12 @@ class DeviceCache:
             )
             return device_assets.upload_texture(prepared, self.device)
 
-        return self._textures.get(texture_id, make)
+        cache = self._textures if self._lasts(texture_id) else self._passing_textures
+        return cache.get(texture_id, make)
+
+    def _lasts(self, asset_id: str) -> bool:
+        """Whether an asset is one of those that scenes share."""
+        return self._store is None or self._store.is_stored(asset_id)
 
     def _derived(
         self, asset_id: str, name: str, compute: Callable[[], device_assets.Arrays]

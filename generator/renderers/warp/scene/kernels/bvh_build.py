@@ -2,7 +2,8 @@
 
 Source: Wald, "On fast construction of SAH-based bounding volume hierarchies", IEEE RT 2007, with
 nodes of eight as in Wald, Benthin and Boulos 2008: the largest part of a node is split until there
-are eight.
+are eight. Trees over sorted boxes: Lauterbach et al., "Fast BVH construction on GPUs", Computer
+Graphics Forum 28(2), 2009.
 """
 
 import warp as wp
@@ -19,7 +20,7 @@ NOWHERE = 1.0e30
 def grow(
     boxes: wp.array2d[wp.float32],
     leaf: int,
-    quick: int,
+    cells: wp.array[wp.uint32],
     nodes: wp.array3d[wp.float32],
     codes: wp.array2d[wp.int32],
     leaves: wp.array[wp.vec2i],
@@ -33,7 +34,7 @@ def grow(
 def grow_tree(
     boxes: wp.array2d[float],
     leaf: int,
-    quick: int,
+    cells: wp.array[wp.uint32],
     nodes: wp.array3d[float],
     codes: wp.array2d[int],
     leaves: wp.array[wp.vec2i],
@@ -45,13 +46,14 @@ def grow_tree(
         boxes: Low corner, number, minus high corner, 0 [n, 8]; permuted: the boxes of a
             node are contiguous.
         leaf: Maximum number of boxes in a leaf.
-        quick: 1 to cut parts in the middle of their longest side; 0 by the surface area heuristic.
+        cells: Morton codes of the boxes' cells [n], rising: parts are cut between cells; none to
+            cut parts by the surface area heuristic.
         nodes: Bounds: low x, high x, low y, ... [., 6, 8]; no ray enters unused lanes.
         codes: Child of each lane: the number of a node, or -1 - number of a leaf [., 8].
         leaves: (begin, end) into ``boxes``.
         counts: (nodes, leaves).
     """
-    grow(boxes, leaf, quick, nodes, codes, leaves, counts)
+    grow(boxes, leaf, cells, nodes, codes, leaves, counts)
 
 
 @wp.kernel

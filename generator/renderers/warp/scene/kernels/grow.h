@@ -28,11 +28,16 @@ auto bin_of = [](float steps) {
     return k < 0 ? 0 : k >= BINS ? BINS - 1 : k;
 };
 
-// Part of a node: its bounds, and those of its boxes' doubled centres.
+// Boxes in the order of their cells are cut between cells.
+const bool is_sorted = cells.shape[0] > 0;
+
+// Part of a node: its bounds, and those of its boxes' doubled centres, unless boxes are sorted.
 struct Part { int begin, end; Floats bounds, low, high; };
 auto add = [&](Part& part, Floats box) {
-    const Floats centre = doubled_centre(box);
     part.bounds = smaller(part.bounds, box);
+    if (is_sorted)
+        return;
+    const Floats centre = doubled_centre(box);
     part.low = smaller(part.low, centre);
     part.high = larger(part.high, centre);
 };
@@ -50,12 +55,6 @@ auto halve = [&](const Part& part, Part& left, Part& right) {
 };
 // The axis and the bin at which the best split begins its right part; no axis if all centres coincide.
 struct Split { int axis, at; };
-// In the middle of the longest axis.
-auto middle_split = [&](const Part& part) -> Split {
-    const Floats size = part.high - part.low;
-    const int level = size[1] > size[0] ? 1 : 0, axis = size[2] > size[level] ? 2 : level;
-    return {size[axis] > 0.0f ? axis : -1, BINS / 2};
-};
 auto best_split = [&](const Part& part, Floats scale) -> Split {
     const Floats low = part.low, high = part.high;
     Floats bins[3][BINS];
@@ -106,15 +105,32 @@ auto best_split = [&](const Part& part, Floats scale) -> Split {
     }
     return split;
 };
+// Cut a sorted part where the highest bit changes in which its cells differ.
+auto cut_sorted = [&](const Part& part, Part& left, Part& right) {
+    const unsigned first = cells.data[part.begin], last = cells.data[part.end - 1];
+    if (first == last)
+        return halve(part, left, right);
+    const unsigned changed = 1u << (31 - __builtin_clz(first ^ last));
+    const unsigned least = last & ~(changed - 1);
+    int below = part.begin, from = part.end - 1;
+    while (from - below > 1) {
+        const int middle = (below + from) / 2;
+        (cells.data[middle] < least ? below : from) = middle;
+    }
+    left = part_of(part.begin, from);
+    right = part_of(from, part.end);
+};
 // Cut a part in two.
 auto cut = [&](const Part& part, Part& left, Part& right) {
+    if (is_sorted)
+        return cut_sorted(part, left, right);
     const int begin = part.begin, end = part.end;
     const Floats low = part.low, high = part.high;
     Floats scale = 0.0f;
     for (int axis = 0; axis < 3; ++axis)
         if (high[axis] > low[axis])
             scale[axis] = (float)BINS / (high[axis] - low[axis]);
-    const Split split = quick ? middle_split(part) : best_split(part, scale);
+    const Split split = best_split(part, scale);
     left = {begin, begin, FARTHEST, FARTHEST, -FARTHEST};
     right = {end, end, FARTHEST, FARTHEST, -FARTHEST};
     // All centres coincide: any split is as good, and the median keeps the depth logarithmic.
