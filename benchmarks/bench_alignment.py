@@ -45,11 +45,11 @@ ROWS = (
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Road:
-    """One road of a scene.
+    """A road of a scene.
 
     Attributes:
         grades: Absolute, at each metre.
-        radii_m: Of its arcs.
+        radii_m: Radii of its arcs.
         turn_deg: Sum of the angles by which it turns.
     """
 

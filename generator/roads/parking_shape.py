@@ -17,7 +17,7 @@ from gen_data.roads.lane_graph import world_points
 EDGE_M = 0.6
 """Asphalt beyond the outermost lines."""
 INNER_RADIUS_M = 5.0
-"""Smallest radius of the inner edge of a bent aisle (Muster-Garagenverordnung, sections 2 and 3)."""
+"""Smallest radius of the inner edge of a bent aisle (M-GarVO, sections 2 and 3)."""
 _SPEED_M_S = 2.8
 _STEP_M = 1.0
 """Points of bent lanes are this far apart at most, on the middle line."""
