@@ -81,7 +81,8 @@ def main() -> None:
     given = parser.parse_args()
     if given.one:
         name, *numbers = given.one
-        print(measure(name, *map(int, numbers)))
+        views, n, warm_up = map(int, numbers)
+        print(measure(name, views, n, warm_up))
         return
     if given.old is None:
         parser.error("expected the path of an older checkout")

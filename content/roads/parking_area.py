@@ -34,8 +34,10 @@ def parking_area(**parameters: Any) -> Solid:
     patches = [_area(profile, along, across, 0.0, "asphalt", slots["asphalt"])]
     patches.append(_skirt(profile, along, y, slots["ground"]))
     if look.carriageway not in road_materials.UNPAVED:
-        paint = deck.PAINT_LIFT_M, "marking", slots["marking"]
-        patches += [_area(profile, *line, *paint) for line in _lines(profile, along)]
+        patches += [
+            _area(profile, *line, deck.PAINT_LIFT_M, "marking", slots["marking"])
+            for line in _lines(profile, along)
+        ]
     every = along if len(along) == 2 else [*along[:-1:_SLAB_STEPS].tolist(), x]
     slabs = [_slab(profile, span, across) for span in pairwise(every)]
     return road_materials.make_street_solid(patches, look, slabs)

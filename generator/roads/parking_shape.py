@@ -80,7 +80,7 @@ class ParkingShape:
         """Extent across all aisles."""
         return self.aisles * self.module_m
 
-    def plan(self, x_m: Array, y_m: Array) -> Array:
+    def plan(self, x_m: Array | float, y_m: Array | float) -> Array:
         """Points [..., 2] in the frame of the car park at places [...]."""
         x, y = np.broadcast_arrays(np.asarray(x_m, np.float64), np.asarray(y_m, np.float64))
         if self.curvature_per_m == 0.0:

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from gen_data.content.roads.parking_area import parking_area
 from gen_data.core.errors import ConfigError
@@ -23,8 +24,8 @@ def _lanes(kind: str) -> list[Lane]:
     return [lane for lane in parking_lanes(SHAPE, "lot", SE3()) if lane.kind == kind]
 
 
-def _from_centre(lane: Lane) -> np.ndarray:
-    return np.asarray(lane.center_m)[:, :2] - CENTRE_M
+def _from_centre(lane: Lane) -> NDArray[np.float64]:
+    return np.subtract(np.array(lane.center_m)[:, :2], CENTRE_M)
 
 
 def test_aisles_are_arcs_about_one_centre_in_both_directions() -> None:
@@ -72,7 +73,7 @@ def test_paint_lies_between_bays_and_nowhere_else() -> None:
     caster = RayCaster((mesh.vertices_m, mesh.faces))
     roles = [material.role for material in mesh.materials]
 
-    def met(places: np.ndarray) -> set[str]:
+    def met(places: NDArray[np.float64]) -> set[str]:
         above = np.insert(places, 2, 5.0, axis=1)
         hits = caster.cast(above, DOWN)
         assert (hits.mesh == 0).all()
@@ -104,15 +105,14 @@ def test_straight_car_parks_are_bends_of_endless_radius() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fields", "fact"),
+    ("element", "fact"),
     [
-        ({"aisles": 2, "curvature_per_m": 0.07}, "would have a radius of 3.3 m"),
-        ({"bays": 40, "curvature_per_m": -0.03}, "would turn by 172 degrees"),
+        (ParkingArea(name="lot", aisles=2, curvature_per_m=0.07), "would have a radius of 3.3 m"),
+        (ParkingArea(name="lot", bays=40, curvature_per_m=-0.03), "would turn by 172 degrees"),
     ],
 )
-def test_bends_that_cars_cannot_follow_are_refused(fields: dict[str, float], fact: str) -> None:
+def test_bends_that_cars_cannot_follow_are_refused(element: ParkingArea, fact: str) -> None:
     """The message names the field of the element."""
-    element = ParkingArea(name="lot", **fields)
     with pytest.raises(
         ConfigError, match=rf"elements\.lot\.curvature_per_m is .*{re.escape(fact)}"
     ):
