@@ -16,7 +16,7 @@ from tests.embree import RayCaster
 
 RADIUS_M = 50.0
 SHAPE = ParkingShape(bays=18, aisles=2, curvature_per_m=1.0 / RADIUS_M)
-CENTRE_M = np.array([0.0, RADIUS_M])
+CENTRE_M: NDArray[np.float64] = np.array([0.0, RADIUS_M])
 DOWN = (0.0, 0.0, -1.0)
 
 
@@ -25,7 +25,8 @@ def _lanes(kind: str) -> list[Lane]:
 
 
 def _from_centre(lane: Lane) -> NDArray[np.float64]:
-    return np.subtract(np.array(lane.center_m)[:, :2], CENTRE_M)
+    places: NDArray[np.float64] = np.array(lane.center_m, np.float64)
+    return places[:, :2] - CENTRE_M
 
 
 def test_aisles_are_arcs_about_one_centre_in_both_directions() -> None:
