@@ -24,12 +24,17 @@ CONFIGS = ("street", "kitti_rig", "rooms", "pedestrians", "closeup", "tabletop")
 _HERE = Path(__file__).resolve().parent.parent
 
 
-def measure(name: str, views: int, n: int, warm_up: int) -> float:
-    """CPU ms per sample of ``n`` samples after ``warm_up`` others, with images and labels."""
+def measure(name: str, views: int, n: int, warm_up: int, *without: str) -> float:
+    """CPU ms per sample of ``n`` samples after ``warm_up`` others, with images and labels.
+
+    ``without`` names randomizers to leave out.
+    """
     factory_module = _module("assemble.pipeline_factory")
     shards = _module("runner.shard")
     overrides = (f"views_per_scene={views}", "steps_per_scene=1")
-    config = _module("assemble.config").load_config(f"{name}.yaml", overrides=overrides)
+    config = _module("assemble.config").load_config(
+        f"{name}.yaml", overrides=overrides, without=without
+    )
     factory = factory_module.PipelineFactory(config, n + warm_up)
     with tempfile.TemporaryDirectory() as folder, factory() as pipeline:
         # As workers do, which collect garbage between shards.
@@ -76,7 +81,8 @@ def main() -> None:
     given = parser.parse_args()
     if given.one:
         name, *numbers = given.one
-        print(measure(name, *map(int, numbers)))
+        views, n, warm_up = map(int, numbers)
+        print(measure(name, views, n, warm_up))
         return
     if given.old is None:
         parser.error("expected the path of an older checkout")

@@ -31,6 +31,7 @@ LOT = (
     "shared.course=right", "shared.fill=0.5", "randomizers.people.count=0",
     "randomizers.relief.grade={uniform: [-0.015, 0.015]}", *SMALL,
 )  # fmt: skip
+BENT_LOT = (*LOT, "shared.bend=0.02", "shared.aisles=2")
 SIDE = (
     "shared.junction=x", "shared.course_side=left", "shared.radius=40", "shared.turn=35",
     "shared.median=none", "shared.landmark=none", "randomizers.relief.grade=0.06", SMALL[0],
@@ -64,6 +65,11 @@ def highway() -> Pair:
 @pytest.fixture(scope="module")
 def lot() -> Pair:
     return _shipped("parking.yaml", LOT, "buildings", "lamps", "street_lights")
+
+
+@pytest.fixture(scope="module")
+def bent_lot() -> Pair:
+    return _shipped("parking.yaml", BENT_LOT, "buildings", "lamps", "street_lights")
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +119,7 @@ def test_motorways_slope_down_to_the_inside_of_bends(highway: Pair) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", ["highway", "lot", "crossing"])
+@pytest.mark.parametrize("where", ["highway", "lot", "bent_lot", "crossing"])
 def test_wheels_stand_on_the_ground(where: str, request: pytest.FixtureRequest) -> None:
     """As high as on level ground, to 15 mm, where planes of the ground meet below a car."""
     here, level = request.getfixturevalue(where)
@@ -130,12 +136,16 @@ def test_wheels_stand_on_the_ground(where: str, request: pytest.FixtureRequest) 
 
 
 @pytest.mark.slow
-def test_bays_and_aisles_of_car_parks_lie_on_their_ground(lot: Pair) -> None:
+@pytest.mark.parametrize(("where", "least"), [("lot", 38), ("bent_lot", 70)])
+def test_bays_and_aisles_of_car_parks_lie_on_their_ground(
+    where: str, least: int, request: pytest.FixtureRequest
+) -> None:
     """Lines of bays are chords of 2.5 m across planes of 4 m: within 15 mm, as wheels are.
 
     Nobody lays out a lot steeper than its streets.
     """
-    _check_lanes(lot, "lot", 38, apart_m=0.015)
+    lot: Pair = request.getfixturevalue(where)
+    _check_lanes(lot, "lot", least, apart_m=0.015)
     heights = [p[2] for lane in lot[0].scene.lanes if lane.road == "lot" for p in lane.center_m]
     assert 0.02 < np.ptp(heights) < 3.0
 
