@@ -110,6 +110,8 @@ def _compare(
         agreed = caster.agrees(pulses.origins_m, axes, seen)
         for rays in _rays_around(axes, pulses.R_world_lidar, sensor):
             left = np.flatnonzero(~agreed)
+            if not len(left):
+                break
             agreed[left] = caster.agrees(pulses.origins_m[left], rays[left], seen.at(left))
         agreement.rays += len(ids)
         for k in np.flatnonzero(~agreed):
