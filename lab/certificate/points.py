@@ -75,7 +75,7 @@ class Pulses:
     Attributes:
         scene: The world at the instant.
         which: Numbers of the points in their cloud, [n].
-        R_world_lidar: Of the scanner then, [3, 3].
+        R_world_lidar: Axes of the scanner then, [3, 3].
     """
 
     scene: Scene

@@ -49,7 +49,7 @@ class Seen:
     reach: se3.Array
 
     def at(self, rays: NDArray[np.intp]) -> "Seen":
-        """Those of the rays at these indices."""
+        """Statements about the rays at these indices."""
         return Seen(
             self.distance[rays], self.tolerance[rays], self.instance_id[rays], self.reach[rays]
         )

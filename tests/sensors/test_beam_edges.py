@@ -65,7 +65,7 @@ def points_of(sensor: LidarSensor, renderer: Post) -> np.ndarray:
 
 
 @pytest.mark.parametrize("beams", [(), STAGGERED])
-def test_beams_on_one_plane_have_no_edges_and_those_beside_a_post_do(
+def test_beams_on_one_plane_have_no_edges_and_beams_at_a_post_do(
     beams: tuple[object, ...],
 ) -> None:
     """On each ring the last beam before either side of the post, and the first one on it."""
@@ -112,12 +112,12 @@ def test_beams_of_seven_rays_at_edges_find_the_points_of_seven_rays_everywhere(m
 
 
 class Rooms(Post):
-    """As Post; three beams of those traced also see instance 5 in a mirror, the next one a pane."""
+    """As Post; three of the traced beams also see instance 5 in a mirror, the next one a pane."""
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
         hits = super().scan(scene, lidar, beams)
         post = np.flatnonzero(hits.instance_id[:, 0] == POST_ID)
-        # Of all beams those in the middle of the post, where there is no edge.
+        # Of all beams the ones in the middle of the post, where there is no edge.
         aside = np.abs(np.arctan2(beams.directions[post, 1], beams.directions[post, 0]))
         post = np.sort(post[np.argsort(aside, kind="stable")[:4]])
         surface = np.array([SURFACES.index("mirrored")] * 3 + [0], np.uint8)
@@ -131,7 +131,7 @@ class Rooms(Post):
         return replace(hits, detours=detours)
 
 
-def test_origins_are_those_of_the_rays_of_both_kinds_of_beams() -> None:
+def test_origins_belong_to_the_rays_of_both_kinds_of_beams() -> None:
     sensor = LidarSensor(model="VLP-16", divergence="edges", origins=True, returns="dual")
     scene = sensor.mount(RgbCamera(name="color").mount(Scene("t")))
     rng = Streams(seed=0, scene=0).rng("sensor/lidar")

@@ -1,8 +1,8 @@
 """Beams at whose rims there may be something else than on their axes.
 
 Pulses of a scanner lie as close as its beams are wide (an HDL-64E fires every 0.17 degrees, its
-beams have 0.11), so that most edges in a scene go through a beam. Where a beam and its neighbours
-end on one plane, all its rays do.
+beams have 0.11): most edges in a scene go through a beam. Where a beam and its neighbours end on
+one plane, all its rays do.
 """
 
 from dataclasses import replace
@@ -15,16 +15,16 @@ from gen_data.sensors.lidar.scan_pattern import LidarModel
 
 Float32 = NDArray[np.float32]
 STEP_MIN_RAD = 1e-4
-"""Least angle between rings: those of a table of beams may be equal."""
+"""Least angle between rings: a table of beams may have equal elevations."""
 
 
 def find_edges(range_m: Float32, model: LidarModel) -> NDArray[np.intp]:
-    """Indices of the beams beside which there is an edge, by the ranges of their axes [n].
+    """Indices of the beams next to an edge, by the ranges of their axes [n].
 
-    Neighbours are the pulses before and after of the same ring and, of rotating scanners, those of
-    the rings above and below. Beside an edge a range deviates by more than a pulse length, within
-    which echoes merge, from the plane through its neighbours: on a plane 1 / range is linear in a
-    small angle. A range of inf is nothing within reach.
+    Neighbours are the pulses before and after in the same ring and, for rotating scanners, in the
+    rings above and below. Next to an edge a range deviates from the plane through its neighbours by
+    more than a pulse length, within which echoes merge; on a plane 1 / range is linear in a small
+    angle. A range of inf is nothing within reach.
     """
     elevation_rad = np.zeros(1) if model.prisms is not None else model.elevations_rad()
     rings = len(elevation_rad)

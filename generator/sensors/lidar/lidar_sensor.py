@@ -59,7 +59,7 @@ class LidarSensor(mounting.Mounted):
             centre, along its axis.
         returns: Return of a pulse to report; ``dual`` reports two.
         divergence: Whether beams diverge: ``true`` traces seven rays of every beam instead of one,
-            ``edges`` seven of those beside which the range changes, for a third of the cost.
+            ``edges`` seven of each beam next to a change of range, for a third of the cost.
         window: Transmittance of the scanner's window, one way, relative to a clean one; dust and
             grime lower it. Light passes it twice.
         ideal: No noise, no missed return, no weather, no mirror images, a clean window: every hit
