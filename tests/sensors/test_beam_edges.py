@@ -66,7 +66,7 @@ def points_of(sensor: LidarSensor, renderer: Post) -> np.ndarray:
 
 @pytest.mark.parametrize("beams", [(), STAGGERED])
 def test_beams_on_one_plane_have_no_edges_and_beams_at_a_post_do(
-    beams: tuple[object, ...],
+    beams: tuple[tuple[float, float], ...],
 ) -> None:
     """On each ring the last beam before either side of the post, and the first one on it."""
     sensor = LidarSensor(model="VLP-16", beams=beams or tuple((e, 0.0) for e, _ in STAGGERED))
