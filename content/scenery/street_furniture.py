@@ -140,6 +140,27 @@ def bollard_symmetries(seed: int) -> tuple[asset_types.Symmetry, ...]:
     return () if _bollard_kind(seed) == "stone" else axis_symmetries(z=0)
 
 
+def guide_post(seed: int) -> Solid:
+    """A guide post of a road in the country (StVO, sign 620): white, with a black band.
+
+    Traffic on this side of the road, ahead of +X, sees one reflector, traffic on the other side
+    two. Height and section are assumed within 0.05 m. Slots: white, band, reflector.
+    """
+    rng = variant_rng("guide_post", seed)
+    h = rng.between(0.95, 1.05, "height_m")
+    body = block((-0.03, -0.06, 0.0), (0.03, 0.06, h), 0.008)
+    band = block((-0.031, -0.061, h - 0.3), (0.031, 0.061, h - 0.05), 0.0, 1)
+    front = block((0.031, -0.02, h - 0.27), (0.034, 0.02, h - 0.09), 0.0, 2)
+    behind = [
+        block((-0.034, -0.03, z - 0.03), (-0.031, 0.03, z + 0.03), 0.0, 2)
+        for z in (h - 0.23, h - 0.13)
+    ]
+    white, black = painted_material("#e4e4de", 0.55), painted_material("#17181a", 0.5)
+    reflector = replace(painted_material("#dfe2e2", 0.2), role="sign")
+    hull = hulls.box((-0.034, -0.061, 0.0), (0.034, 0.061, h))
+    return make_solid([body, band, front, *behind], (white, black, reflector), [hull])
+
+
 def traffic_cone(seed: int) -> Solid:
     """A traffic cone with two white sleeves (EN 13422). Slots: orange, white, foot."""
     rng = variant_rng("cone", seed)

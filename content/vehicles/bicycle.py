@@ -28,6 +28,9 @@ POSES = ("ride", "wait")
 _CRANK_M = 0.17
 _BULK = (1.0, 1.22)
 """Girth of a clothed cyclist, from tight to loose or padded, relative to a lean one's; assumed."""
+_SPOKES, _SPOKE_M = 18, 0.0024
+"""Of a wheel, and half the width of one: together as wide as 36 spokes of 2 mm (a triangle's mean
+width is 1.65 of its outer radius), of which a laser beam meets several."""
 _WAITS_AHEAD_M, _WAITS_HIPS_M, _WAITS_CRANK_RAD = 0.22, 0.89, math.radians(210.0)
 """Who waits stands before the saddle, astride the bicycle, a foot on a raised pedal (assumed)."""
 
@@ -103,7 +106,7 @@ def cyclist_facts(seed: int, pose: str = "ride") -> Facts:
     return Facts(in_turn(STYLES, seed), {"rider": "yes", "pose": pose})
 
 
-def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
+def spoked_wheel(radius_m: float, tyre_m: float) -> Patch:
     """A thin wheel about the origin, its axle along Y."""
     ring = circle(tyre_m, 6) + np.array([radius_m - tyre_m, 0.0])
     tyre = lathe([*map(tuple, ring), tuple(ring[0])], 24, Slot.TYRE)
@@ -116,12 +119,12 @@ def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
     )
     hub = cone((0.022, -0.035), (0.022, 0.035), 6, Slot.CHROME)
     wires = []
-    for k in range(spokes):
-        turn = 2.0 * math.pi * k / spokes
+    for k in range(_SPOKES):
+        turn = 2.0 * math.pi * k / _SPOKES
         end = (radius_m - 2.2 * tyre_m) * np.array([math.cos(turn), math.sin(turn), 0.0])
         start = np.array([0.02 * end[1], -0.02 * end[0], 0.03 * (-1) ** k])
         wire = np.array([start, end])
-        wires.append(sweep(wire, circle(0.0022, 3), capped=False, slot=Slot.CHROME))
+        wires.append(sweep(wire, circle(_SPOKE_M, 3), capped=False, slot=Slot.SPOKE))
     return join_patches([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
 
 
@@ -142,7 +145,7 @@ def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top:
 
 def _machine(style: str, frame: _Frame, turn_rad: float, rng: VariantRng) -> list[Patch]:
     """The bicycle itself; ``turn_rad`` is the left crank's angle."""
-    wheel = spoked_wheel(frame.wheel_m, frame.tyre_m, 14)
+    wheel = spoked_wheel(frame.wheel_m, frame.tyre_m)
     parts = [wheel.moved(sign * frame.axle, 0.0, frame.wheel_m) for sign in (1.0, -1.0)]
     parts += [*_tubes(frame), *_bars(style, frame), *_drive(frame, turn_rad)]
     x, z = frame.saddle

@@ -44,6 +44,7 @@ class VehicleSlot(IntEnum):
     AMBER_BEACON = 26
     ROOF_SIGN = 27
     SOFT_TOP = 28
+    SPOKE = 29
 
 
 COLORS = load_table(__package__, "colors", tuple[str, ...])

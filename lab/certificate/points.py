@@ -2,8 +2,10 @@
 
 A ray goes from the laser's place at the instant of the pulse towards the point, and must meet the
 point's object at its distance: within the noise of the device, and without a solid one before it.
+A point of a beam that diverges may be of the axis or of one of six rays around it; one must agree.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -62,10 +64,8 @@ def check_points(examined: Examined) -> Iterator[Finding]:
 def _unable(sensor: Sensor | None) -> str:
     """Why the points of a sensor cannot be compared; empty if they can."""
     if isinstance(sensor, lidar_sensor.LidarSensor):
-        return "its beams diverge: a point may be of any ray of its beam" * sensor.divergence
-    if isinstance(sensor, pseudo_lidar.PseudoLidar):
         return ""
-    return "a sensor of another package"
+    return "" if isinstance(sensor, pseudo_lidar.PseudoLidar) else "a sensor of another package"
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +75,14 @@ class Pulses:
     Attributes:
         scene: The world at the instant.
         which: Numbers of the points in their cloud, [n].
+        R_world_lidar: Axes of the scanner then, [3, 3].
     """
 
     scene: Scene
     which: NDArray[np.intp]
     origins_m: Array
     points_m: Array
+    R_world_lidar: Array
 
 
 def _compare(
@@ -104,13 +106,38 @@ def _compare(
         tolerance_m = noisy_m + 0.5 * step_m + TOLERANCE_M + RELATIVE_TOLERANCE * range_m
         ids = points["instance_id"][pulses.which].astype(np.int64)
         seen = Seen(range_m, tolerance_m, ids, np.full(len(ids), np.inf))
-        agreed = caster.agrees(pulses.origins_m, away / range_m[:, None], seen)
+        axes = away / range_m[:, None]
+        agreed = caster.agrees(pulses.origins_m, axes, seen)
+        for rays in _rays_around(axes, pulses.R_world_lidar, sensor):
+            left = np.flatnonzero(~agreed)
+            if not len(left):
+                break
+            agreed[left] = caster.agrees(pulses.origins_m[left], rays[left], seen.at(left))
         agreement.rays += len(ids)
         for k in np.flatnonzero(~agreed):
             agreement.contradictions.add(
                 f"sample {sample.index}, point {pulses.which[k]}: a ray does not meet instance "
                 f"{ids[k]} within {tolerance_m[k]:.3f} m of {range_m[k]:.3f} m"
             )
+
+
+def _rays_around(axes: Array, R_world_lidar: Array, sensor: Sensor) -> Iterator[Array]:
+    """Unit vectors [n, 3] of the rays around the axes of beams, world; none without divergence.
+
+    They are where half of a beam's light is farther from its axis, every 60 degrees from the
+    horizontal of the scanner.
+    """
+    if not isinstance(sensor, lidar_sensor.LidarSensor) or not sensor.divergence:
+        return
+    spread = math.sqrt(0.5) * math.tan(0.5e-3 * sensor.device.divergence_mrad)
+    steep = np.abs(axes @ R_world_lidar[:, 2]) >= 0.9
+    helper = np.where(steep[:, None], R_world_lidar[:, 0], R_world_lidar[:, 2])
+    across = np.cross(helper, axes)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    up = np.cross(axes, across)
+    for turn in np.arange(6) * (math.pi / 3.0):
+        rays = axes + spread * (math.cos(turn) * across + math.sin(turn) * up)
+        yield rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
 def _spread_m(sensor: Sensor) -> tuple[float, float]:
@@ -133,7 +160,9 @@ def _choose_pulses(
         eye_m = middle.camera(sensor.camera).T_world_camera.translation_m
         at_m = T_world_middle.apply(points["position_m"][which].astype(np.float64))
         if len(which):
-            yield Pulses(middle, which, np.broadcast_to(eye_m, at_m.shape), at_m)
+            yield Pulses(
+                middle, which, np.broadcast_to(eye_m, at_m.shape), at_m, T_world_middle.rotation()
+            )
         return
     assert isinstance(sensor, lidar_sensor.LidarSensor)
     moves = bool(sample.scene.tracks) and sensor.motion_distortion != "none"
@@ -150,7 +179,8 @@ def _choose_pulses(
         T_world_points = T_world_lidar if sensor.motion_distortion == "raw" else T_world_middle
         lasers_m = laser_places_m(sensor.device, points[which])
         at_m = T_world_points.apply(points["position_m"][which].astype(np.float64))
-        yield Pulses(scene, which, T_world_lidar.apply(lasers_m), at_m)
+        R_world_lidar = T_world_lidar.rotation()
+        yield Pulses(scene, which, T_world_lidar.apply(lasers_m), at_m, R_world_lidar)
 
 
 def laser_places_m(model: scan_pattern.LidarModel, points: NDArray[np.void]) -> Array:

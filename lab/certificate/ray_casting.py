@@ -48,6 +48,12 @@ class Seen:
     instance_id: NDArray[np.int64]
     reach: se3.Array
 
+    def at(self, rays: NDArray[np.intp]) -> "Seen":
+        """Statements about the rays at these indices."""
+        return Seen(
+            self.distance[rays], self.tolerance[rays], self.instance_id[rays], self.reach[rays]
+        )
+
 
 @dataclass
 class Agreement:

@@ -1,12 +1,14 @@
-"""Riders of bicycles: girth and luggage."""
+"""Riders of bicycles: girth and luggage; spokes of wheels."""
 
 import numpy as np
 import pytest
 
 from gen_data.content.vehicles import FAMILIES
-from gen_data.content.vehicles.bicycle import cyclist, cyclist_facts
+from gen_data.content.vehicles.bicycle import cyclist, cyclist_facts, spoked_wheel
+from gen_data.content.vehicles.vehicle_materials import VehicleSlot
 from gen_data.core.asset_types import MeshData
 from gen_data.core.errors import AssetError
+from gen_data.renderers.warp.lidar.infrared_materials import infrared_fields
 from tests.solids import with_role
 
 VARIANTS = [cyclist(seed).mesh for seed in range(FAMILIES["cyclist"].variants)]
@@ -66,3 +68,21 @@ def test_girth_varies() -> None:
 
     assert max(widths) / min(widths) > 1.05
     assert max(widths) == pytest.approx(0.6, abs=0.15)
+
+
+def test_spokes_cover_as_much_of_a_wheel_as_thirty_six_of_two_millimetres() -> None:
+    """36 x 2 mm of the circumference, at three radii, and scatter a laser's light."""
+    wheel = spoked_wheel(0.345, 0.021)
+    wires = wheel.corners_m[wheel.slots == VehicleSlot.SPOKE].reshape(-1, 3, 3)[..., [0, 2]]
+    edges = np.roll(wires, -1, axis=1) - wires
+    turn = np.linspace(0.0, 2.0 * np.pi, 6000, endpoint=False)
+    for radius_m in (0.1, 0.17, 0.25):
+        p = radius_m * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        away = p[:, None, None] - wires
+        side = np.sign(edges[..., 0] * away[..., 1] - edges[..., 1] * away[..., 0])
+        covered = (np.abs(side.sum(axis=2)) == 3).any(axis=1).mean()
+        assert covered == pytest.approx(36 * 0.002 / (2.0 * np.pi * radius_m), rel=0.15)
+
+    (steel,) = (m for m in VARIANTS[0].materials if m.metallic == 0.5)
+    even, *_ = infrared_fields(steel, np.asarray(steel.base_color))
+    assert even > 0.2

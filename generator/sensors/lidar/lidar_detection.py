@@ -103,6 +103,23 @@ def join_pulses(pulses: Pulses, more: Pulses) -> Pulses:
     )
 
 
+def replace_pulses(pulses: Pulses, which: NDArray[np.intp], finer: Pulses) -> Pulses:
+    """The pulses with other candidates of those at the indices ``which`` [m]."""
+    found = np.isfinite(finer.range_m)
+    most = int(found.sum(axis=1).max(initial=0))
+    columns = max(most, pulses.light.shape[1])
+    first = np.argsort(~found, axis=1, kind="stable")[:, :columns]
+    joined = {}
+    for name in Pulses.__slots__:
+        old, new = getattr(pulses, name), getattr(finer, name)
+        wide = _empty_field(name, old, columns)
+        wide[:, : old.shape[1]] = old
+        wide[which] = _empty_field(name, new, columns)
+        wide[which, : first.shape[1]] = np.take_along_axis(new, first, axis=1)
+        joined[name] = wide
+    return Pulses(**joined)
+
+
 def is_detected(pulses: Pulses, rng: Rng) -> NDArray[np.bool_]:
     """Draw whether each candidate is detected: for light L with ``p = L^k / (1 + L^k)``."""
     draw = rng.random(pulses.light.shape, dtype=np.float32)

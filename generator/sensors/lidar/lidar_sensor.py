@@ -15,6 +15,7 @@ from gen_data.core.scene import Lidar, Scene, Weather
 from gen_data.core.streams import Rng
 from gen_data.sensors import device_presets, mounting
 from gen_data.sensors.lidar import (
+    beam_edges,
     lidar_atmosphere,
     lidar_detection,
     point_origins,
@@ -57,7 +58,8 @@ class LidarSensor(mounting.Mounted):
         camera: Without a rig: name of a camera listed before it; the rig is then at the camera's
             centre, along its axis.
         returns: Return of a pulse to report; ``dual`` reports two.
-        divergence: Whether beams diverge; costs seven rays instead of one.
+        divergence: Whether beams diverge: ``true`` traces seven rays of every beam instead of one,
+            ``edges`` seven of each beam next to a change of range, for a third of the cost.
         window: Transmittance of the scanner's window, one way, relative to a clean one; dust and
             grime lower it. Light passes it twice.
         ideal: No noise, no missed return, no weather, no mirror images, a clean window: every hit
@@ -78,7 +80,7 @@ class LidarSensor(mounting.Mounted):
     rotation_hz: float | None = Field(None, gt=0, le=100)
     camera: str = "color"
     returns: lidar_detection.Kept = "strongest"
-    divergence: bool = False
+    divergence: bool | Literal["edges"] = False
     window: float = Field(1.0, gt=0, le=1)
     ideal: bool = False
     motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
@@ -158,18 +160,14 @@ class LidarSensor(mounting.Mounted):
         beams = LidarRays(
             shots.directions,
             1e-3 * model.divergence_mrad,
-            SUBRAYS if self.divergence else 1,
+            SUBRAYS if self.divergence is True else 1,
             model.range_m[1],
             shots.origins_m,
             shots.time_s,
             sweep.order,
             self.origins,
         )
-        hits = renderer.scan(scene, lidar, beams)
-        hits = _without_mirrored(hits) if self.ideal else hits
-        if self.origins:
-            hits = point_origins.number_detours(hits)
-        pulses = lidar_detection.make_pulses(hits, model, self.returns)
+        pulses, detours = self._find_pulses(scene, lidar, renderer, beams)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
             pulses = _apply_weather(pulses, weather, model, lidar, shots, rng)
@@ -185,7 +183,7 @@ class LidarSensor(mounting.Mounted):
             ids, detour = point_origins.split_numbers(returns.instance_id)
             returns = replace(returns, instance_id=ids)
             straight_m = shots.points_m(returns.row, returns.range_m)
-            origins = point_origins.make_origins(ids, detour, straight_m, hits.detours, lidar)
+            origins = point_origins.make_origins(ids, detour, straight_m, detours, lidar)
         if self.ideal:
             intensity = lidar_detection.report_intensity(returns.reflectance, model)
         else:
@@ -199,6 +197,36 @@ class LidarSensor(mounting.Mounted):
         if self.faults is None:
             return cloud
         return self.faults.apply(cloud, int(sweep.ring.max()) + 1, rng)
+
+    def _find_pulses(
+        self, scene: Scene, lidar: Lidar, renderer: interfaces.Renderer, beams: LidarRays
+    ) -> tuple[lidar_detection.Pulses, SecondaryHits | None]:
+        """Candidates of all beams, and the secondary hits that their ids number."""
+        hits = self._trace(scene, lidar, renderer, beams)
+        pulses = lidar_detection.make_pulses(hits, self.device, self.returns)
+        which = np.zeros(0, np.intp)
+        if self.divergence == "edges":
+            which = beam_edges.find_edges(hits.range_m[:, 0], self.device)
+        if not len(which):
+            return pulses, hits.detours
+        wide = beam_edges.choose_beams(beams, which, SUBRAYS)
+        more = self._trace(scene, lidar, renderer, wide, hits.detours)
+        finer = lidar_detection.make_pulses(more, self.device, self.returns)
+        pulses = lidar_detection.replace_pulses(pulses, which, finer)
+        return pulses, point_origins.join_detours(hits.detours, more.detours)
+
+    def _trace(
+        self,
+        scene: Scene,
+        lidar: Lidar,
+        renderer: interfaces.Renderer,
+        beams: LidarRays,
+        before: SecondaryHits | None = None,
+    ) -> LidarHits:
+        """Hits of beams; numbered after those ``before`` if origins are wanted."""
+        hits = renderer.scan(scene, lidar, beams)
+        hits = _without_mirrored(hits) if self.ideal else hits
+        return point_origins.number_detours(hits, before) if self.origins else hits
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -4,7 +4,7 @@ Detection selects and merges hits by their light. Each hit therefore carries the
 secondary hit along, in the upper bits of its instance id.
 """
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,15 +17,30 @@ from gen_data.core.scene import Lidar
 _ID_BITS = 16
 
 
-def number_detours(hits: LidarHits) -> LidarHits:
-    """Hits with int64 ids: instance id, and above it 1 + number of a secondary hit, 0 for first."""
+def number_detours(hits: LidarHits, before: SecondaryHits | None = None) -> LidarHits:
+    """Hits with int64 ids: instance id, and above it 1 + number of a secondary hit, 0 for first.
+
+    Numbers go on after the secondary hits ``before``, as in ``join_detours``.
+    """
     ids: NDArray[Any] = hits.instance_id.astype(np.int64)
     detours = hits.detours
     if detours is not None:
-        numbers = np.arange(1, len(detours.ray) + 1, dtype=np.int64) << _ID_BITS
+        first = 1 + (0 if before is None else len(before.ray))
+        numbers = np.arange(first, first + len(detours.ray), dtype=np.int64) << _ID_BITS
         mixed: NDArray[Any] = numbers | detours.instance_id
         detours = replace(detours, instance_id=mixed)
     return replace(hits, instance_id=ids, detours=detours)
+
+
+def join_detours(first: SecondaryHits | None, more: SecondaryHits | None) -> SecondaryHits | None:
+    """Secondary hits of two sets of beams, one after the other; ``ray`` counts within each set."""
+    if first is None or more is None:
+        return first or more
+    joined: dict[str, Any] = {}
+    for field in fields(SecondaryHits):
+        parts = [getattr(hits, field.name) for hits in (first, more)]
+        joined[field.name] = None if any(p is None for p in parts) else np.concatenate(parts)
+    return SecondaryHits(**joined)
 
 
 def split_numbers(mixed: NDArray[Any]) -> tuple[NDArray[np.uint16], NDArray[np.int64]]:
