@@ -139,7 +139,8 @@ def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
     starts = defaultdict(list)
     for lane in lanes:
         start = lane.name, lane.center_m[0], _heading(lane.center_m, 0)
-        starts[(lane.kind, *_cell(lane.center_m[0]))].append(start)
+        i, j = _cell(lane.center_m[0])
+        starts[lane.kind, i, j].append(start)
     linked = ((lane, tuple(_find_successors(lane, starts))) for lane in lanes)
     # A lane is measured once, as long as it is the same object.
     return tuple(
