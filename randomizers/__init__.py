@@ -11,6 +11,7 @@ TABLE = PluginTable[Randomizer](
         "arm_motion": "gen_data.randomizers.arm_motion:ArmMotion",
         "arm_task": "gen_data.randomizers.arm_task:ArmTask",
         "backdrop": "gen_data.randomizers.backdrop:Backdrop",
+        "beside_vehicles": "gen_data.randomizers.beside_vehicles:BesideVehicles",
         "camera_intrinsics": "gen_data.randomizers.camera_intrinsics:CameraIntrinsics",
         "camera_on_lane": "gen_data.randomizers.camera_on_lane:CameraOnLane",
         "camera_pose": "gen_data.randomizers.camera_pose:CameraPose",

@@ -1,5 +1,6 @@
 """Draws of assets for the object groups of a template."""
 
+from collections.abc import Iterable
 from typing import Annotated
 
 from pydantic import Field
@@ -7,7 +8,7 @@ from pydantic import Field
 from gen_data.core import errors, streams
 from gen_data.core.bounded_cache import ObjectCache
 from gen_data.core.interfaces import AssetIndex
-from gen_data.core.scene import ObjectGroup, Scene
+from gen_data.core.scene import Body, ObjectGroup, Scene
 from gen_data.core.streams import pick_by_weight
 from gen_data.randomizers.base import RandomizerBase, check_known, choose
 
@@ -77,3 +78,8 @@ def draw_asset(weights: CategoryWeights, rng: streams.Rng) -> str:
     """Draw a category in proportion to its weight, then one of its assets uniformly."""
     index = pick_by_weight([weight for weight, _ in weights], float(rng.uniform()))
     return choose(weights[index][1], rng)
+
+
+def free_number(members: Iterable[Body]) -> int:
+    """The first number that no member's name ends with, nor any larger one."""
+    return max((int(body.name.rpartition("/")[2]) for body in members), default=-1) + 1

@@ -1,18 +1,29 @@
 """Company for people who stand or walk along lanes: couples, families, talking circles."""
 
 import math
-from collections.abc import Collection, Sequence
 from typing import Annotated, Literal
 
-from gen_data.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.assets.asset_ids import parse_asset_id
 from gen_data.config import distributions as dist
 from gen_data.core import se3, streams
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members, change_assets
 from gen_data.core.scene import Body, Scene
-from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
+from gen_data.randomizers.asset_groups import (
+    CategoryWeights,
+    GroupRandomizer,
+    draw_asset,
+    free_number,
+)
 from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
-from gen_data.randomizers.pedestrian_poses import moving_poses, talking_poses, walking_poses
+from gen_data.randomizers.pedestrian_poses import (
+    has_pose_of,
+    has_poses,
+    moving_poses,
+    pose_person,
+    talking_poses,
+    walking_poses,
+)
 
 SIZE_MAX = 12
 """Largest size of a company."""
@@ -67,7 +78,7 @@ class Companions(GroupRandomizer):
                 changed[leader.name] = _talking(leader.asset, assets)
                 added += self._stand_around(leader, others, weights, ground, assets, rng)
         scene = change_assets(scene, changed)
-        return add_members(scene, group, added, assets, first=_free_number(leaders))
+        return add_members(scene, group, added, assets, first=free_number(leaders))
 
     def _walk_beside(
         self,
@@ -86,7 +97,7 @@ class Companions(GroupRandomizer):
             drawn = draw_asset(weights, rng)
             aside_m = side * gap_m * (k // 2 + 1) * (-1.0 if k % 2 else 1.0)
             ahead_m = _SWAY_M * float(rng.normal())
-            if not _fits(drawn, walking_poses(), assets) and not _has_poses(drawn):
+            if not has_pose_of(drawn, walking_poses(), assets) and not has_poses(drawn):
                 continue  # a mesh that stands cannot walk
             place = leader.T_world_body @ se3.SE3((ahead_m, aside_m, 0.0))
             made += self._place(_walking(drawn, assets), place, ground, assets)
@@ -123,7 +134,7 @@ class Companions(GroupRandomizer):
 
 def _walking(asset: str, assets: AssetIndex) -> str:
     """The asset as it walks: in its own pose if that is a walk, at its own phase."""
-    return _posed(asset, walking_poses(), "walk", assets)
+    return pose_person(asset, walking_poses(), "walk", assets)
 
 
 def _talking(asset: str, assets: AssetIndex) -> str:
@@ -131,28 +142,4 @@ def _talking(asset: str, assets: AssetIndex) -> str:
     seed = parse_asset_id(asset).parameters.get("seed", 0)
     poses = talking_poses()
     pose = poses[seed % len(poses)] if isinstance(seed, int) else poses[0]
-    return _posed(asset, poses, pose, assets)
-
-
-def _posed(asset: str, fitting: Collection[str], pose: str, assets: AssetIndex) -> str:
-    """The asset, in another pose unless its own fits; meshes with one pose stay as they are."""
-    if _fits(asset, fitting, assets) or not _has_poses(asset):
-        return asset
-    parsed = parse_asset_id(asset)
-    return str(AssetId(parsed.name, {**parsed.parameters, "pose": pose}))
-
-
-def _fits(asset: str, fitting: Collection[str], assets: AssetIndex) -> bool:
-    """Whether its pose is one of these; an asset without a pose fits everywhere."""
-    own = dict(assets.get(asset).attributes).get("pose")
-    return own is None or own in fitting
-
-
-def _has_poses(asset: str) -> bool:
-    """Whether it is made in any pose: ids of files of packs and users have no parameters."""
-    return bool(parse_asset_id(asset).parameters)
-
-
-def _free_number(members: Sequence[Body]) -> int:
-    """The first number that no member's name ends with."""
-    return max((int(body.name.rpartition("/")[2]) for body in members), default=-1) + 1
+    return pose_person(asset, poses, pose, assets)

@@ -33,6 +33,7 @@ from tests.tiers import cases
 
 GIVEN: dict[str, dict[str, Any]] = {
     "arm_task": {"group": "objects", "task": "stack"}, "ceiling_lights": {"visible": True},
+    "beside_vehicles": {"group": "people", "vehicles": ["lane_objects"], "count": 8},
     "companions": {"group": "lane_objects", "size": 4, "gap_m": {"uniform": [3, 5]}},
     "distractors": {"count": {"uniform_integer": [1, 4]}}, "colors": {"probability": True},
     "drone_flight": {"from_end_m": 10}, "hand_held": {"group": "hands", "objects": "objects"},
@@ -43,9 +44,9 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields that a randomizer requires, or that ensure that it changes the scene."""
 
 PHYSICS_BOUND = (
-    "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "door_paths",
-    "ego_on_lane", "furnish", "hand_held", "lane_objects", "objects", "physics_properties", "plate",
-    "reaching_hand", "traffic_flow",
+    "arm_configuration", "arm_motion", "arm_task", "beside_vehicles", "companions", "distractors",
+    "door_paths", "ego_on_lane", "furnish", "hand_held", "lane_objects", "objects",
+    "physics_properties", "plate", "reaching_hand", "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""
 

@@ -18,12 +18,12 @@ from gen_data.renderers.warp.scene.struct_dtypes import to_device
 _MESH_BYTES, _TEXTURE_BYTES = 88 << 20, 192 << 20
 """Of a GPU."""
 _OWN_MESH_BYTES, _OWN_TEXTURE_BYTES = 24 << 20, 8 << 20
-"""On the CPU, where most are views of files and take no memory that could not be dropped.
+"""On the CPU, where most are views of files, whose pages the system can drop.
 
 There is as much for meshes and textures that are not stored, such as roads: their scene alone has
 them, and in one cache they would drive out all others."""
 _MESHES, _TEXTURES = 4096, 2048
-"""Some kilobytes each beside their arrays, and up to two maps of files."""
+"""Some kilobytes each in addition to their arrays, and up to two maps of files."""
 _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
 _LENSES = 64
