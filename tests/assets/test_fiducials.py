@@ -112,7 +112,7 @@ def test_a_detector_reads_the_text_of_a_qr_code(library: Library, number: int) -
     ("asset_id", "message"),
     [
         ("marker?dictionary=apriltag_36h12", "dictionary is none of apriltag_36h11"),
-        ("marker?dictionary=aruco_4x4_50&number=50", "number is none of 0, 1"),
+        ("marker?dictionary=aruco_4x4_50&number=50", "number expects a whole number from 0 to 49"),
         ("marker?side_m=2", "side_m expects a number from 0.02 to 0.6"),
         ("calibration_board?columns=12&rows=9&dictionary=aruco_4x4_50", "dictionary is none of"),
     ],

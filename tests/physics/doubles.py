@@ -30,7 +30,7 @@ class Solids:
 
     def __getattr__(self, name: str) -> Any:
         """Physics gets by with collision geometry and kinematics, and this library stores none."""
-        if name == "derived":
+        if name in ("derived", "is_stored"):
             raise AttributeError(name)
         raise AssertionError(f"physics must not ask the library for '{name}'")
 
