@@ -409,6 +409,7 @@ def test_the_second_of_two_tabs_to_save_is_asked(live: Live, page: Page) -> None
         type_behind(other, "# My table", ", other")
         save(other)
         assert "other" not in text_of(page)
+        page.bring_to_front()  # A tab in the background has no focus that keys reach.
         put_cursor(page, "# My table")
         page.keyboard.press("Control+s")
         page.wait_for_selector(".q-dialog:has-text('has changed since it was read')")
