@@ -23,6 +23,8 @@ _BEYOND_M = 0.3
 _POST_M, _INSET_M = 1.5, 0.1
 """Distance between posts, and of the first one from an end."""
 _WIDTH_M, _GRADE_MAX, _HEIGHT_M = (1.0, 3.0), 0.13, 3.0
+_USUAL_M = (0.0, 0.41, 6.0, 0.05)
+"""One run of the largest gradient and length (DIN 18040-1)."""
 _METALS = (GALVANISED, painted_material("#3b3d3f", 0.45))
 
 Point = tuple[float, float]
@@ -35,13 +37,15 @@ def door_ramp(seed: int, tops_m: tuple[float, ...], width_m: float) -> Solid:
 
     Args:
         seed: Seed of stone and metal, which cycle through a few kinds each.
-        tops_m: Distance from the upper end and height, in turn, at each change of gradient.
+        tops_m: Distance from the upper end and height, in turn, at each change of gradient; of any
+            number of runs and rests. Without numbers, one run of 6 m.
         width_m: With the curbs.
 
     Raises:
         ValueError: ``tops_m`` is not a way down of two or more places from 0 m, above the ground
             and at most 3 m high, with at most 13 %, or the width is not from 1 to 3 m.
     """
+    tops_m = tops_m or _USUAL_M
     tops = list(zip(tops_m[::2], tops_m[1::2], strict=False))
     if len(tops_m) % 2 or not _leads_down(tops) or not _WIDTH_M[0] <= width_m <= _WIDTH_M[1]:
         raise ValueError(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gen_data.assets.library import open_library
 from gen_data.content.scenery.ramps import door_ramp
 from tests.embree import RayCaster
 
@@ -11,7 +12,9 @@ DOWN = (0.0, 0.0, -1.0)
 
 
 def _caster() -> RayCaster:
-    mesh = door_ramp(0, TOPS_M, 1.4).mesh
+    """The ramp by its id, as streets name it: with two runs and a rest."""
+    numbers = ",".join(f"{value:g}" for value in TOPS_M)
+    mesh = open_library().mesh(f"door_ramp?seed=0&tops_m={numbers}&width_m=1.4")
     return RayCaster((mesh.vertices_m, mesh.faces))
 
 
