@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 from collections.abc import Callable
@@ -429,7 +430,8 @@ def test_a_killed_process_costs_nothing(live: Live, page: Page) -> None:
     (server,) = (int(pid) for pid in children.read_text().split() if _is_server(pid))
     workers = Path(f"/proc/{server}/task/{server}/children").read_text().split()
     for tid in Path(f"/proc/{server}/task").iterdir():
-        workers += (tid / "children").read_text().split()
+        with contextlib.suppress(FileNotFoundError):  # A thread that has ended meanwhile.
+            workers += (tid / "children").read_text().split()
     for pid in set(workers):
         os.kill(int(pid), signal.SIGKILL)
     wait_for_pictures(page, before)
