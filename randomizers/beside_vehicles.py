@@ -101,10 +101,8 @@ def _stand(
         return []
     rise_m = height_m - bounds_m[0][2] - place.translation_m[2]
     pose = se3.SE3((0.0, 0.0, rise_m)) @ place
-    footprint = Footprint.of(pose, bounds_m)
-    if not ground.is_free(footprint):
+    if not ground.occupy(Footprint.of(pose, bounds_m)):
         return []
-    ground.add(footprint)
     return [Member(asset, pose.rounded(), collides=False)]
 
 

@@ -126,9 +126,8 @@ class Companions(GroupRandomizer):
     def _place(self, asset: str, pose: se3.SE3, ground: Ground, assets: AssetIndex) -> list[Member]:
         """The member, if its place is free; it then occupies that place."""
         footprint = Footprint.of(pose, assets.bounds_m(asset))
-        if not ground.is_free(footprint.expand(self.min_clearance_m)):
+        if not ground.occupy(footprint, self.min_clearance_m):
             return []
-        ground.add(footprint)
         return [Member(asset, pose.rounded(), collides=False)]
 
 

@@ -60,8 +60,7 @@ class DoorPaths(asset_groups.GroupRandomizer):
                     continue
                 asset, pose = _lay(asset_groups.draw_asset(weights, rng), door_m, end_m)
                 footprint = free_space.Footprint.of(pose, assets.bounds_m(asset))
-                if ground.is_free(footprint):
-                    ground.add(footprint)
+                if ground.occupy(footprint):
                     members.append(Member(asset, pose.rounded(), collides=False))
         return add_members(scene, group, members, assets)
 

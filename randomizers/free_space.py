@@ -90,6 +90,13 @@ class Ground:
         own = footprint.rectangle
         return not any(overlap_of(own, self._rectangles[k]) for k in near)
 
+    def occupy(self, footprint: Footprint, margin_m: float = 0.0) -> bool:
+        """Add a footprint if it is free with a margin on every side; return whether it was."""
+        if not self.is_free(footprint.expand(margin_m)):
+            return False
+        self.add(footprint)
+        return True
+
 
 def standing_bodies(scene: Scene) -> Iterator[Body]:
     """Yield the bodies with an instance id, except roads."""

@@ -230,20 +230,12 @@ class LaneObjects(GroupRandomizer):
                 x, y = (float(rng.uniform(low[k], high[k])) for k in range(2))
                 stand = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
                 pose = (stand @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
-                if self._occupy(ground, pose, solid_m):
+                if ground.occupy(free_space.Footprint.of(pose, solid_m), self.min_clearance_m):
                     yield Member(asset, pose, scale, collides=False)
                     break
             else:
                 remedy = "a smaller count or min_clearance_m"
                 raise self.reject("no free place for a scattered object", remedy)
-
-    def _occupy(self, ground: free_space.Ground, pose: SE3, bounds_m: Bounds) -> bool:
-        """Occupy the ground under an object if it is free; return whether it was."""
-        footprint = free_space.Footprint.of(pose, bounds_m)
-        if not ground.is_free(footprint.expand(self.min_clearance_m)):
-            return False
-        ground.add(footprint)
-        return True
 
     def _draw_run(
         self, at_m: float, weights: CategoryWeights, bounds_of: BoundsOf, rng: Rng
