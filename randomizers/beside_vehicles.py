@@ -13,7 +13,7 @@ from gen_data.core.lane_geometry import LaneLine
 from gen_data.core.members import Member, add_members
 from gen_data.core.scene import Body, Lane, Scene
 from gen_data.randomizers.asset_groups import GroupRandomizer, draw_asset, free_number
-from gen_data.randomizers.base import choose
+from gen_data.randomizers.base import check_known, choose
 from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
 from gen_data.randomizers.pedestrian_poses import (
     has_pose_of,
@@ -53,6 +53,14 @@ class BesideVehicles(GroupRandomizer):
     turn_deg: Annotated[dist.Scalar, dist.Bounds(-180, 180)] = dist.Normal(
         0.0, 50.0, (-150.0, 150.0)
     )
+
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raise ConfigError if a group, or a category of the weights, is unknown."""
+        super().check(scene, assets)
+        groups = [group.name for group in scene.groups]
+        for name in self.vehicles:
+            field = f"randomizers.{self.name}.vehicles"
+            check_known(name, groups, f"{field}: the template has no object group")
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with people added to the group."""

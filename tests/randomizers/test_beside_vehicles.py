@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gen_data.config.distributions import Constant, Uniform
+from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.members import Member, add_members
 from gen_data.core.scene import Lane, ObjectGroup, Scene
@@ -87,6 +88,13 @@ def test_feet_are_on_the_road_or_on_the_pavement(library: AssetLibrary) -> None:
     alone = draw(street(library, pavement=False), library, gap_m=Uniform(0.3, 0.6))
     places = np.array([body.T_world_body.translation_m for body in alone.bodies[1:]])
     assert (math.sin(YAW_RAD) * places[:, 0] - math.cos(YAW_RAD) * places[:, 1] < 1.0).all()
+
+
+def test_a_group_of_vehicles_that_the_template_lacks_is_refused(library: AssetLibrary) -> None:
+    """Nobody would stand anywhere, silently."""
+    made = BesideVehicles(name="outside", group="people", vehicles=("parked", "parkd"))
+    with pytest.raises(ConfigError, match=r"^randomizers\.outside\.vehicles: .*'parkd'.*parked"):
+        made.check(street(library), library)
 
 
 def test_places_are_taken_once(library: AssetLibrary) -> None:
