@@ -320,5 +320,6 @@ class Asset:
 
     @property
     def words(self) -> frozenset[str]:
-        """Tags, category and ``category/subcategory``, by which YAML excludes it."""
-        return frozenset((self.category, f"{self.category}/{self.subcategory}", *self.tags))
+        """Tags, category and, if it has one, ``category/subcategory``: YAML excludes it by them."""
+        part = (f"{self.category}/{self.subcategory}",) if self.subcategory else ()
+        return frozenset((self.category, *part, *self.tags))
