@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,12 +39,27 @@ class Deck:
     z_m: Array
     rows_m: Array
     slots: dict[str, int]
+    _known: dict[bytes, Array] = field(default_factory=dict, init=False, repr=False)
 
     def at(self, s_m: Array, t_m: Array, lift_m: float = 0.0) -> Array:
         """Points [..., 3] on the surface, or over it."""
-        flat = self.line.points(s_m.ravel(), t_m.ravel())
-        z = np.interp(t_m.ravel(), self.t_m, self.z_m) + lift_m
-        return np.column_stack([flat, z]).reshape(*s_m.shape, 3)
+        x, y, heading = self._poses(s_m)
+        points = np.zeros((*s_m.shape, 3))
+        points[..., 0] = x - t_m * np.sin(heading)
+        points[..., 1] = y + t_m * np.cos(heading)
+        points[..., 2] = np.interp(t_m, self.t_m, self.z_m) + lift_m
+        return points
+
+    def _poses(self, s_m: Array) -> Array:
+        """``x, y, heading`` of the line, shape [3, ...]; strips share their rows."""
+        is_grid = s_m.ndim == 2 and bool((s_m == s_m[:, :1]).all())
+        rows = s_m[:, 0] if is_grid else s_m.ravel()
+        key = rows.tobytes()
+        if key not in self._known:
+            self._known[key] = self.line.poses(rows)
+        columns = (len(rows), 1) if is_grid else s_m.shape
+        poses: Array = self._known[key].T.reshape(3, *columns)
+        return poses
 
     def rows(self, start_m: float, end_m: float) -> Array:
         """Arc lengths from start to end with the common rows between them."""

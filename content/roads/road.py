@@ -1,7 +1,6 @@
 """Roads: carriageway, markings, kerbs, sidewalks, verges, traces of use; zebra crossings."""
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -356,20 +355,14 @@ def _guard_rail(
 def _hulls(deck: Deck, profile: RoadShape) -> list[Array]:
     """Collision slabs of at most 20 m under every strip."""
     stations = np.linspace(0.0, profile.length_m, max(2, int(np.ceil(profile.length_m / 20.0)) + 1))
-    rows = {
-        side: [strip for strip in strips(profile, side) if strip.kind != "kerb"] for side in (1, -1)
-    }
-    hulls = []
-    for s0, s1 in pairwise(stations):
-        for side, row in rows.items():
-            for strip in row:
-                top = deck.at(
-                    np.repeat([s0, s1], 2), side * np.tile([strip.inner_m, strip.outer_m], 2)
-                )
-                # A point in the gutter would take the kerb's height from the other side.
-                top[:, 2] = np.tile([strip.inner_z_m, strip.outer_z_m], 2)
-                hulls.append(np.concatenate([top, top - np.array([0.0, 0.0, 0.3])]))
-    return hulls
+    lying = [(s, side) for side in (1, -1) for s in strips(profile, side) if s.kind != "kerb"]
+    across = np.array([[side * strip.inner_m, side * strip.outer_m] for strip, side in lying])
+    s, t = np.broadcast_arrays(stations[:, None, None], across)
+    tops = deck.at(s, t)
+    # A point in the gutter would take the kerb's height from the other side.
+    tops[..., 2] = [[strip.inner_z_m, strip.outer_z_m] for strip, _ in lying]
+    slabs = np.stack([tops[:-1], tops[1:]], axis=2).reshape(-1, 4, 3)
+    return list(np.concatenate([slabs, slabs - np.array([0.0, 0.0, 0.3])], axis=1))
 
 
 def crosswalk(

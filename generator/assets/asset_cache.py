@@ -30,12 +30,17 @@ from numpy.typing import NDArray
 
 from gen_data.core.bounded_cache import ByteCache, CountCache, Sized
 from gen_data.core.mapped_files import map_file, owned_bytes
+from gen_data.core.recent_files import remove_least_recent
 from gen_data.core.serialization import canonical_json
 
 S = TypeVar("S", bound=Sized)
 T = TypeVar("T")
 Arrays = dict[str, NDArray[Any]]
 
+MAX_BYTES = 20_000_000_000
+"""Bound of the files of one folder; all shipped assets take about 8 GB."""
+_CHECKED_KEYS = 512
+"""The size is measured after one write in so many, which keys choose: it takes about a second."""
 FORMAT = 3
 """Increased whenever the same sources are stored as different arrays."""
 # Small, since renderers and physics engines keep their own copies.
@@ -66,9 +71,12 @@ class DiskCache:
 
     Attributes:
         folder: Created by the first write.
+        max_bytes: Bound of all files together, earlier formats included; the least
+            recently used ones are removed.
     """
 
     folder: Path
+    max_bytes: int = MAX_BYTES
     _intact: CountCache[None] = field(
         default_factory=lambda: CountCache(_INTACT_FILES), init=False, repr=False, compare=False
     )
@@ -83,9 +91,14 @@ class DiskCache:
         # A full disk or a read-only home only makes a run slower.
         with contextlib.suppress(OSError):
             _store(path, key, arrays)
+            self._make_room(key)
             if sum(array.nbytes for array in arrays.values()) >= _MAPPED_BYTES_MIN:
                 return _load(path, key, self._intact) or arrays
         return arrays
+
+    def _make_room(self, written: str) -> None:
+        if int(written[:8], 16) % _CHECKED_KEYS == 0:
+            remove_least_recent(self.folder.glob("format-*"), self.max_bytes)
 
     def find(self, key: str) -> Arrays | None:
         """Load the arrays of a content key; None if they are not stored."""

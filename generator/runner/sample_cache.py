@@ -10,18 +10,17 @@ import json
 import os
 import struct
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from gen_data.core.recent_files import remove_least_recent
 from gen_data.core.serialization import canonical_json
 from gen_data.runner.plan import Plan
 
 MAX_BYTES = 20_000_000_000
-KEPT_SHARE = 0.9
-"""Share of the bound that remains when the least recently used samples are removed."""
 CHECKS = 8
 """The size is measured again after an eighth of the free space: as many processes may fill it."""
 
@@ -100,26 +99,12 @@ class SampleCache:
         return f"{self.content}/{index}".encode()
 
     def _make_room(self, added: int) -> None:
-        """Remove the least recently used files, unfinished ones of killed processes included."""
+        """Remove the least recently used files if the folder may have grown above its bound."""
         self._unmeasured += added
         if self._unmeasured <= self._room:
             return
-        kept = sorted(self._entries())
-        total = sum(size for _, size, _ in kept)
-        if total > self.max_bytes:
-            for _, size, path in kept:
-                if total <= KEPT_SHARE * self.max_bytes:
-                    break
-                path.unlink(missing_ok=True)
-                total -= size
+        total = remove_least_recent([self.root], self.max_bytes)
         self._unmeasured, self._room = 0, (self.max_bytes - total) / CHECKS
-
-    def _entries(self) -> Iterator[tuple[int, int, Path]]:
-        """Time of last use [ns], size [bytes] and path of every file."""
-        for path in self.root.glob("*/*"):
-            with suppress(FileNotFoundError):  # Another process removed it.
-                status = path.lstat()
-                yield status.st_mtime_ns, status.st_size, path
 
 
 def _encode(files: Mapping[str, bytes], key: bytes) -> bytes:

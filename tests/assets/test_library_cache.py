@@ -227,3 +227,38 @@ def test_memory_is_bounded_and_forgets_the_oldest(tmp_path: Path) -> None:
     get("c")
     assert computed == ["a", "b", "c"]
     assert len(store) == 2
+
+
+def test_the_least_recently_used_files_on_disk_go_first_above_the_bound(tmp_path: Path) -> None:
+    """Of a bound of 20 kB nine tenths remain; files of an earlier format go too."""
+    earlier = tmp_path / "format-1" / "ab" / "x.arrays"
+    earlier.parent.mkdir(parents=True)
+    earlier.write_bytes(bytes(1000))
+    os.utime(earlier, (0, 0))
+    disk = DiskCache(tmp_path, max_bytes=20_000)
+
+    def add(number: int) -> Path:
+        key = f"{0:08x}{number:056x}"
+        disk.arrays(key, lambda: {"x": np.zeros(800, np.uint8)})
+        (path,) = tmp_path.rglob(f"{key}.arrays")
+        return path
+
+    used = add(0)
+    for number in range(1, 60):
+        os.utime(used)
+        os.utime(add(number), (number, number))
+        total = sum(path.stat().st_size for path in entries(tmp_path))
+        assert total <= 20_000
+    kept = [int(path.stem[8:], 16) for path in entries(tmp_path)]
+    assert not earlier.exists()
+    assert kept[0] == 0
+    assert kept[1:] == [*range(60 - len(kept) + 1, 60)]
+    assert total > 15_000
+
+
+def test_surfaces_of_a_shape_that_no_other_street_has_do_not_fill_the_disk(tmp_path: Path) -> None:
+    library = open_library(cache_dir=tmp_path)
+    for asset in ("road?bends=10,20,30,0.0125", "junction?arms_deg=81,180,270,-1"):
+        library.mesh(asset)
+        library.bounds_m(asset)
+    assert entries(tmp_path) == []
