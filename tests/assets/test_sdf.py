@@ -96,7 +96,7 @@ def test_axes_are_in_the_named_frame(tmp_path: Path, axis: str, expected: list[f
 def test_before_version_1_5_axes_are_in_the_frame_of_the_model(
     tmp_path: Path, version: str, stated: str, expected: list[float]
 ) -> None:
-    """As libsdformat converts such files (``sdf/1.5/1_4.convert``); most of Gazebo's models do."""
+    """As libsdformat converts such files (``sdf/1.5/1_4.convert``)."""
     slide = HINGED[2].replace("revolute", "prismatic")
     slide = slide.replace("<xyz>0 0 1</xyz>", f"<xyz>0 1 0</xyz>{stated}")
     door = HINGED[1].replace(' relative_to="frame"', "").replace(">1 0 0 ", ">1 0 0.5 ")
