@@ -122,6 +122,25 @@ def test_a_joint_without_limits_is_refused_with_remedy_unless_it_mimics_one(tmp_
         describe(tmp_path, link("a"), link("b"), joint("j", "a", "b", kind="revolute"))
 
 
+@pytest.mark.parametrize(("rgba", "base", "vertex"), [
+    ("1 0 0 1", (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
+    ("1 1 1 1", (1.0, 1.0, 1.0), (0.0, 1.0, 0.0)),
+])  # fmt: skip
+def test_a_colour_of_the_description_replaces_colours_of_vertices_but_white_does_not(
+    tmp_path: Path, rgba: str, base: tuple[float, ...], vertex: tuple[float, ...]
+) -> None:
+    """Red over green vertices is red, not their product, which is black."""
+    lines = [f"v {x} {y} 0 0 1 0" for x, y in ((0, 0), (1, 0), (0, 1))]
+    (tmp_path / "a.obj").write_text("\n".join([*lines, "f 1 2 3\n"]))
+    mesh = '<geometry><mesh filename="a.obj"/></geometry>'
+    material = f'<material name="m"><color rgba="{rgba}"/></material>'
+    described = describe(tmp_path, link("a", visual(material, mesh)))
+    soup = read_shape(Folder(tmp_path), described.links["a"].visuals[0], SE3()).soup
+    assert soup.slots[0].material.base_color == base
+    assert soup.colors is not None
+    assert (soup.colors == vertex).all()
+
+
 def test_colours_beyond_1_are_limited_and_named(tmp_path: Path) -> None:
     """RViz limits them as well: of 255 0 0, red remains."""
     own = '<material name="m"><color rgba="255 0 -1 1.5"/></material>'
