@@ -1,13 +1,14 @@
 """MJCF reader: bodies, joints and geoms of MuJoCo's own parser and compiler.
 
 Source: MuJoCo documentation, "XML Reference" and "Modeling". Files of meshes and images are never
-read here: MuJoCo compiles a box for each mesh, and shapes refer to the files. Its compiler resolves
-defaults, frames, units of angles and all ways to state a direction.
+given to it: MuJoCo compiles a box for each mesh, and shapes refer to the files. Its compiler
+resolves defaults, frames, units of angles and all ways to state a direction. Meshes to which it
+fits a box, a capsule or another primitive are read here, and given to it as triangles.
 """
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import Any
@@ -16,6 +17,7 @@ from xml.etree.ElementTree import Element, tostring
 import numpy as np
 
 from gen_data.assets import asset_folder, robot_description
+from gen_data.assets.readers import read_mesh
 from gen_data.core.asset_types import Joint
 from gen_data.core.errors import AssetError
 from gen_data.core.safe_xml import parse_xml
@@ -50,7 +52,9 @@ def read_mjcf(folder: asset_folder.Folder, relative: str) -> robot_description.R
     text = tostring(root, encoding="unicode") if included else data.decode("utf-8", "replace")
     try:
         spec = mujoco.MjSpec.from_string(text)
+        fitted = _fitted_meshes(spec, mujoco)
         source = _Source(folder, relative, *_strip_files(spec, mujoco))
+        read_files = _fit_primitives(spec, fitted, source, mujoco)
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())[:300]
@@ -59,7 +63,7 @@ def read_mjcf(folder: asset_folder.Folder, relative: str) -> robot_description.R
         described = _Reader(source, model, mujoco).describe()
     except ValueError as error:
         raise AssetError(f"{place}: {error}; correct it") from None
-    return replace(described, included=included)
+    return replace(described, included=tuple(dict.fromkeys((*included, *read_files))))
 
 
 def _expand(folder: asset_folder.Folder, relative: str, root: Element) -> tuple[str, ...]:
@@ -153,6 +157,54 @@ def _strip_meshes(spec: Any, mujoco: Any) -> dict[str, _File]:
     return meshes
 
 
+def _is_fitted(geom: Any, mujoco: Any) -> bool:
+    """Whether the size and place of a primitive are those of a mesh."""
+    kinds = mujoco.mjtGeom
+    return bool(geom.meshname) and geom.type not in (kinds.mjGEOM_MESH, kinds.mjGEOM_SDF)
+
+
+def _fitted_meshes(spec: Any, mujoco: Any) -> dict[str, dict[str, Any]]:
+    """Attributes of the meshes to which primitives are fitted, by name."""
+    names = {geom.meshname for geom in spec.geoms if _is_fitted(geom, mujoco)}
+    found = {}
+    for mesh in spec.meshes:
+        name = mesh.name or PurePosixPath(mesh.file).stem
+        if name in names:
+            lists = {key: list(getattr(mesh, key)) for key in _MESH_LISTS}
+            found[name] = {**lists, "inertia": mesh.inertia, "file": mesh.file}
+    return found
+
+
+_MESH_LISTS = ("scale", "refpos", "refquat", "uservert", "userface")
+
+
+def _fit_primitives(
+    spec: Any, fitted: Mapping[str, Mapping[str, Any]], source: _Source, mujoco: Any
+) -> tuple[str, ...]:
+    """Give MuJoCo the triangles of meshes to which it fits primitives; return their files.
+
+    Raises:
+        AssetError: a mesh is unusable.
+    """
+    files, suffix = list[str](), ".fitted"
+    for name, values in fitted.items():
+        mesh = spec.add_mesh()
+        mesh.name = name + suffix
+        for key in (*_MESH_LISTS, "inertia"):
+            setattr(mesh, key, values[key])
+        if values["file"]:
+            files.append(source.refer(source.folders[0], values["file"]))
+            soup = read_mesh(source.folder, files[-1], materials=False).soup
+            corners, faces = np.unique(
+                soup.corners.reshape(-1, 3).astype(np.float32), axis=0, return_inverse=True
+            )
+            mesh.uservert, mesh.userface = corners.ravel().tolist(), faces.ravel().tolist()
+    for geom in spec.geoms:
+        if _is_fitted(geom, mujoco) and geom.meshname in fitted:
+            geom.meshname += suffix
+    return tuple(files)
+
+
 def _strip_images(
     spec: Any, mujoco: Any, remarks: Counter[str]
 ) -> tuple[dict[str, str], dict[str, Vec3]]:
@@ -227,8 +279,12 @@ class _Reader:
                 self._join(Joint(f"{name}_site", "fixed", body, name, SE3(), _X, 0.0, 0.0))
         self._couple()
         described = robot_description.jointed(self.links, self.poses, self.joints)
-        if model.ntendon:
-            self.remarks["tendon"] += int(model.ntendon)
+        for kind, number in (
+            ("actuator", model.nu), ("camera", model.ncam), ("light", model.nlight),
+            ("sensor", model.nsensor), ("tendon", model.ntendon),
+        ):  # fmt: skip
+            self.remarks[kind] += int(number)
+        self.remarks = +self.remarks
         remarks = tuple(
             f"not used: {count} {what}{'' if count == 1 or what[-1] in ')s' else 's'}"
             for what, count in sorted(self.remarks.items())
@@ -362,9 +418,20 @@ class _Reader:
                 size = (a, 2.0 * b, 0.0)
             if kind:
                 x, y, z = (round(v, _DECIMALS) for v in size)
-                yield g, robot_description.Shape(kind, file, (x, y, z), pose, self._look(g))
+                look = self._look(g)
+                if look.texture and kind != "mesh" and self._is_repeated(g):
+                    self.remarks[
+                        "repetition of an image (it is wrapped once around its shape)"
+                    ] += 1
+                yield g, robot_description.Shape(kind, file, (x, y, z), pose, look)
             else:
                 self.remarks[f"{kinds(number).name.removeprefix('mjGEOM_').lower()} geom"] += 1
+
+    def _is_repeated(self, geom: int) -> bool:
+        """Whether the material of a geom repeats its image."""
+        number = int(self.model.geom_matid[geom])
+        once = self.model.mat_texrepeat[number] == 1.0
+        return bool(self.model.mat_texuniform[number]) or not once.all()
 
     def _look(self, geom: int) -> robot_description.Look:
         """Colour and image of a geom, as MuJoCo's viewer shows them."""

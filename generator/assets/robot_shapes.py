@@ -41,7 +41,25 @@ def read_shape(
     soup = source.soup
     extent = float(np.ptp(soup.corners.reshape(-1, 3), axis=0).max()) if soup.uvs is None else 0.0
     slots = tuple(_apply_look(slot, shape.look, extent) for slot in soup.slots)
-    return replace(source, soup=replace(soup, slots=slots).transformed(matrix))
+    colors = _uncovered_colors(soup, slots)
+    return replace(source, soup=replace(soup, slots=slots, colors=colors).transformed(matrix))
+
+
+def _uncovered_colors(
+    soup: triangle_soup.TriangleSoup, slots: tuple[triangle_soup.MaterialSlot, ...]
+) -> triangle_soup.Float64 | None:
+    """Vertex colours of a mesh, white where a description gives it another colour or an image."""
+    if soup.colors is None:
+        return None
+    covered = [
+        (old.material.base_color, old.material.texture)
+        != (new.material.base_color, new.material.texture)
+        for old, new in zip(soup.slots, slots, strict=True)
+    ]
+    colors: triangle_soup.Float64 = np.where(
+        np.array(covered)[soup.face_slots][:, None, None], 1.0, soup.colors
+    )
+    return colors
 
 
 def _part_of(

@@ -34,6 +34,7 @@ _MAX_DEPTH = 8
 _MODEL = FORMAT_ROOTS[1]
 _ENDLESS = 1e3
 """Limits [rad or m] beyond this are none; 1e16 is the format's default."""
+_TRUE = ("true", "1")
 _KINDS = {"fixed", "revolute", "continuous", "prismatic"}
 _HELD = {"ball", "universal", "screw", "revolute2", "gearbox"}
 """Kinds of other than one position; such a joint stays where the file places it."""
@@ -84,6 +85,8 @@ class _Scope:
         frame: Name of the model's frame, ``__model__`` inside it.
         depth: Files and models around it, and itself.
         lenient: Whether its version, below 1.7, lets parts of two kinds have one name.
+        axes_of_model: Whether its version, below 1.5, states axes of joints in the model's frame
+            (sdformat, ``sdf/1.5/1_4.convert``).
     """
 
     file: str
@@ -91,6 +94,7 @@ class _Scope:
     frame: str
     depth: tuple[str, ...]
     lenient: bool
+    axes_of_model: bool
 
     def named(self, name: str) -> str:
         """Global name of the part that this model calls ``name``."""
@@ -110,6 +114,9 @@ class _Placement:
     placed: str = ""
 
 
+_Shapes = tuple[tuple[Shape, str], ...]
+
+
 @dataclass
 class _Reader:
     """Collects links, joints and frames of a model and those inside it.
@@ -117,6 +124,7 @@ class _Reader:
     Attributes:
         frames: ``{name: (frame it is stated in, its pose there)}``; also of links and joints.
         attached: Link or frame that a frame moves with.
+        shapes: Visual and collision shapes of a link, each with the frame of its pose.
         anchors: Joints with the frame of the axis and the axis in it.
     """
 
@@ -125,6 +133,7 @@ class _Reader:
     frames: dict[str, tuple[str, SE3]] = field(default_factory=dict)
     attached: dict[str, str] = field(default_factory=dict)
     links: dict[str, Link] = field(default_factory=dict)
+    shapes: dict[str, tuple[_Shapes, _Shapes]] = field(default_factory=dict)
     anchors: dict[str, tuple[Joint, str, Vec3]] = field(default_factory=dict)
     included: list[str] = field(default_factory=list)
     remarks: Counter[str] = field(default_factory=Counter)
@@ -140,7 +149,8 @@ class _Reader:
         if len(models) + len(included) != 1:
             raise errors.AssetError(f"{place}: holds {len(models)} models; give a file with one")
         version = [int(n) for n in re.findall(r"\d+", root.get("version", ""))]
-        scope = _Scope(file, prefix, placement.model, (*depth, file), version < [1, 7])
+        names = (file, prefix, placement.model, (*depth, file))
+        scope = _Scope(*names, version < [1, 7], [] != version < [1, 5])
         try:
             if included:
                 inner = self._model_file(file, included[0])
@@ -201,11 +211,12 @@ class _Reader:
         elif element.tag == "link":
             self.frames[name] = self._pose(element, scope, scope.frame)
             visuals, collisions = (
-                tuple(self._shapes(element, tag, scope)) for tag in ("visual", "collision")
+                tuple(self._shapes(element, tag, scope, name)) for tag in ("visual", "collision")
             )
             for tag in _UNUSED:
                 self.remarks[tag] += len(element.findall(tag))
-            self.links[name] = Link(name, visuals, collisions)
+            self.shapes[name] = (visuals, collisions)
+            self.links[name] = Link(name, (), ())
             if len(self.links) > MAX_LINKS:
                 raise ValueError(f"more than {MAX_LINKS} links")
         elif element.tag == "frame":
@@ -278,7 +289,8 @@ class _Reader:
                 direction = _unit(_numbers(xyz.text or "", 3))
                 stated = xyz.get("expressed_in")
                 frame = scope.named(stated) if stated else name
-            if (axis.findtext("use_parent_model_frame") or "").strip() in ("true", "1"):
+            in_model = axis.findtext("use_parent_model_frame")
+            if scope.axes_of_model if in_model is None else in_model.strip().lower() in _TRUE:
                 frame = scope.frame
             joint = self._moving(joint, kind, axis, scope)
         self.anchors[name] = (joint, frame, direction)
@@ -312,9 +324,12 @@ class _Reader:
             )
         return joint
 
-    def _shapes(self, link: Element, tag: str, scope: _Scope) -> Iterator[Shape]:
+    def _shapes(
+        self, link: Element, tag: str, scope: _Scope, name: str
+    ) -> Iterator[tuple[Shape, str]]:
         for element in link.findall(tag):
-            shape = self._shape(element, scope)
+            frame, pose = self._pose(element, scope, name)
+            shape = self._shape(element, scope, pose)
             if shape is None:
                 continue
             zeros = shape.size[: _EXTENTS.get(shape.kind, 0)].count(0.0)
@@ -326,13 +341,11 @@ class _Reader:
                 if shape.look.opacity == 0.0:
                     self.remarks["invisible visual"] += 1
                     continue
-            yield shape
+            yield shape, frame
 
-    def _shape(self, element: Element, scope: _Scope) -> Shape | None:
+    def _shape(self, element: Element, scope: _Scope, at: SE3) -> Shape | None:
         geometry = element.find("geometry")
         given = geometry[0] if geometry is not None and len(geometry) else None
-        pose = element.find("pose")
-        at = SE3() if pose is None else _parse_pose(pose)
         kind = "empty" if given is None else given.tag
         if given is None or kind not in (*_EXTENTS, "mesh"):
             self.remarks[f"{kind} geometry"] += 1
@@ -401,7 +414,7 @@ class _Reader:
                     fixed = Joint(f"{name}_fixed", "fixed", _MODEL, name, SE3(), _X, 0.0, 0.0)
                     placed.append(PlacedJoint(fixed, (0.0, 0.0, 0.0), _X))
             poses[_MODEL] = SE3()
-            links = {_MODEL: Link(_MODEL, (), ()), **self.links}
+            links = {_MODEL: Link(_MODEL, (), ()), **{n: self._whole(n) for n in self.links}}
             described = jointed(links, poses, placed)
         except ValueError as error:
             raise errors.AssetError(f"{place}: malformed SDF ({error}); correct it") from None
@@ -412,6 +425,23 @@ class _Reader:
         )
         files = tuple(dict.fromkeys(self.included))
         return replace(described, included=files, remarks=remarks)
+
+    def _whole(self, name: str) -> Link:
+        """A link with its shapes, whose poses may refer to other frames."""
+        visuals, collisions = (
+            tuple(
+                shape
+                if frame == name
+                else replace(shape, T_link_shape=self._between(name, frame) @ shape.T_link_shape)
+                for shape, frame in shapes
+            )
+            for shapes in self.shapes[name]
+        )
+        return Link(name, visuals, collisions)
+
+    def _between(self, link: str, frame: str) -> SE3:
+        """``T_link_frame``."""
+        return self._at(link).inverse() @ self._at(frame)
 
     def _place(self, joint: Joint, frame: str, axis: Vec3) -> PlacedJoint:
         """A joint in the frame of the root, between links."""

@@ -26,7 +26,10 @@ _HELD = {"floating", "planar"}
 """Kinds that have no single position; such a joint stays where the file places it."""
 _ENDLESS_RAD = 100.0
 """Revolute joints with limits beyond this turn without end."""
+_ENDLESS_M = 1e3
+"""Prismatic joints with limits beyond this have none."""
 _UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
+_UNUSED_OF_JOINTS = ("safety_controller", "calibration")
 
 
 class _Fault(ValueError):
@@ -49,6 +52,7 @@ def read_urdf(folder: Folder, relative: str) -> robot_description.RobotDescripti
     at = root
     try:
         looks = dict(_named_looks(folder, relative, root))
+        remarks += _clamped_colors(root)
         links: dict[str, robot_description.Link] = {}
         for name, at in _iterate_unique(root, "link"):
             visuals, collisions = (
@@ -82,6 +86,7 @@ def read_urdf(folder: Folder, relative: str) -> robot_description.RobotDescripti
             f"{place}{format_position(at)}: malformed URDF ({reason}); correct it"
         ) from None
     counts = Counter(element.tag for element in root if element.tag in _UNUSED)
+    counts += Counter(e.tag for joint in elements for e in joint if e.tag in _UNUSED_OF_JOINTS)
     if counts:
         remarks.append("not used: " + ", ".join(f"{n} <{tag}>" for tag, n in counts.items()))
     return replace(described, remarks=tuple(remarks))
@@ -136,14 +141,25 @@ def _named_looks(
             yield look.name, look
 
 
+def _clamped_colors(root: Element) -> Iterator[str]:
+    """Remarks on colours beyond [0, 1], such as those that count to 255."""
+    for color in root.iter("color"):
+        values = _parse_numbers(color.get("rgba", "0 0 0 0"), 4)
+        if not all(0.0 <= value <= 1.0 for value in values):
+            text = " ".join(f"{value:g}" for value in values)
+            yield f"rgba '{text}'{format_position(color)} is limited to [0, 1]"
+
+
 def _read_look(folder: Folder, relative: str, material: Element) -> robot_description.Look:
     """A material as its element defines it. Raises _Fault."""
     color, texture = material.find("color"), material.find("texture")
     look = robot_description.Look(material.get("name", ""))
     try:
         if color is not None:
-            red, green, blue, alpha = _parse_numbers(color.attrib["rgba"], 4)
-            look = replace(look, color=(red, green, blue), opacity=min(max(alpha, 0.0), 1.0))
+            red, green, blue, alpha = (
+                min(max(v, 0.0), 1.0) for v in _parse_numbers(color.attrib["rgba"], 4)
+            )
+            look = replace(look, color=(red, green, blue), opacity=alpha)
         if texture is not None and texture.get("filename"):
             look = replace(look, texture=resolve_uri(folder, relative, texture.attrib["filename"]))
     except (ValueError, KeyError) as error:
@@ -235,9 +251,17 @@ def _read_joint(element: Element, remarks: list[str]) -> Joint:
         lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
         if not lower <= upper:
             raise ValueError(f"joint '{name[:40]}' has lower limit {lower} above upper {upper}")
+        where = f"joint '{name[:40]}'{format_position(element)}"
         if kind == "revolute" and max(-lower, upper) > _ENDLESS_RAD:
             remarks.append(f"joint '{name[:40]}': limits of {lower:g} and {upper:g} rad are none")
             kind = "continuous"
+        elif kind == "prismatic" and max(-lower, upper) > _ENDLESS_M:
+            remarks.append(
+                f"{where}: limits of {lower:g} and {upper:g} m are none; it stays at its origin"
+            )
+            kind, lower, upper = "fixed", 0.0, 0.0
+        elif lower == upper and mimic is None:
+            remarks.append(f"{where} does not move: its limits are both {lower:g}")
     if kind == "continuous":
         lower, upper = -math.pi, math.pi
     return Joint(

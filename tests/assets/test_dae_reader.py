@@ -1,5 +1,6 @@
 """COLLADA files: units, up axis, nodes, polygons, colours and images as the file states them."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +109,104 @@ def test_transparency_is_that_of_the_format(tmp_path: Path, text: str, opacity: 
     """A_ONE: alpha times factor; RGB_ZERO: 1 - luminance times factor; never invisible."""
     slot = read_mesh(folder_of(tmp_path, transparency=text), "a.dae").soup.slots[0]
     assert slot.material.opacity == pytest.approx(opacity)
+
+
+COLORS = """<source id="c"><float_array id="ca" count="16">1 0 0 1 0 0.5 0 1 0 0 1 1 1 1 1 1
+</float_array><technique_common><accessor source="#ca" count="4" stride="4">
+<param name="R" type="float"/><param name="G" type="float"/><param name="B" type="float"/>
+<param name="A" type="float"/></accessor></technique_common></source><vertices"""
+
+
+@pytest.mark.parametrize("place", ["vertices", "polylist"])
+def test_colours_of_vertices_are_srgb_factors_and_images_replace_them(
+    tmp_path: Path, place: str
+) -> None:
+    """A value of 0.5 in sRGB is 0.214041 linear (IEC 61966-2-1)."""
+    folder = edited(tmp_path, "<vertices", COLORS, material="paint")
+    path = tmp_path / "a.dae"
+    where = {"vertices": '<input semantic="POSITION"', "polylist": '<input semantic="TEXCOORD"'}
+    offset = ' offset="0"' if place == "polylist" else ""
+    given = f'<input semantic="COLOR" source="#c"{offset}/>'
+    path.write_text(path.read_text().replace(where[place], given + where[place], 1))
+    soup = read_mesh(folder, "a.dae").soup
+    assert soup.colors is not None
+    corners = np.array([[1, 0, 0], [0, 0.214041, 0], [0, 0, 1], [1, 1, 1]])
+    np.testing.assert_allclose(soup.colors, corners[[[0, 1, 2], [0, 2, 3]]], atol=1e-6)
+    assert soup.slots[0].material.base_color == pytest.approx((0.214041, 0.050876, 1.0), abs=1e-5)
+
+    path.write_text(path.read_text().replace('target="#paint"', 'target="#wood"'))
+    (tmp_path / "my wood.png").write_bytes(b"")
+    found = read_mesh(Folder(tmp_path), "a.dae")
+    assert found.soup.colors is None
+    assert found.remarks == ("vertex colours are not used where an image is",)
+    path.write_text(path.read_text().replace('target="#wood"', 'target="#none"'))
+    found = read_mesh(Folder(tmp_path), "a.dae")
+    assert found.soup.colors is not None
+    assert found.soup.slots[0].material.base_color == (1.0, 1.0, 1.0)
+
+
+def test_an_image_lies_by_the_texture_coordinates_that_its_material_is_bound_to(
+    tmp_path: Path,
+) -> None:
+    """Such as the second set of a file whose first one is for a light map."""
+    second = """<source id="w"><float_array id="wa" count="8">0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8
+</float_array><technique_common><accessor source="#wa" count="4" stride="2">
+<param name="S" type="float"/><param name="T" type="float"/></accessor></technique_common></source>
+<vertices"""
+    folder = edited(tmp_path, "<vertices", second)
+    (tmp_path / "my wood.png").write_bytes(b"")
+    path = tmp_path / "a.dae"
+    text = path.read_text().replace(
+        "<vcount>", '<input semantic="TEXCOORD" source="#w" offset="1" set="3"/><vcount>'
+    )
+    bound = '<bind_vertex_input semantic="UV0" input_semantic="TEXCOORD" input_set="3"/>'
+    node = '<instance_material symbol="look" target="#wood"'
+    whole = f"{node}>{bound}</instance_material>"
+    for shown, first in ((whole, [0.1, 0.2]), (f"{node}/>", [0, 0])):
+        path.write_text(text.replace(f"{node}/>", shown))
+        soup = read_mesh(folder, "a.dae").soup
+        assert soup.uvs is not None
+        np.testing.assert_allclose(soup.uvs[0, 0], first, atol=1e-6)
+
+
+def values(name: str, kind: str, words: str, count: int, stride: int) -> str:
+    return (
+        f'<source id="{name}"><{kind}_array id="{name}a" count="{count}">{words}</{kind}_array>'
+        f'<technique_common><accessor source="#{name}a" count="{count // stride}" '
+        f'stride="{stride}"><param name="X" type="{kind}"/></accessor></technique_common></source>'
+    )
+
+
+UNIT = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
+SKIN = (
+    '<library_controllers><controller id="skin"><skin source="#plate">'
+    f"<bind_shape_matrix>{UNIT}</bind_shape_matrix>{values('j', 'Name', 'bone', 1, 1)}"
+    f"{values('b', 'float', UNIT, 16, 16)}{values('w', 'float', '1', 1, 1)}"
+    '<joints><input semantic="JOINT" source="#j"/><input semantic="INV_BIND_MATRIX" source="#b"/>'
+    '</joints><vertex_weights count="4"><input semantic="JOINT" source="#j" offset="0"/>'
+    '<input semantic="WEIGHT" source="#w" offset="1"/><vcount>1 1 1 1</vcount>'
+    "<v>0 0 0 0 0 0 0 0</v></vertex_weights></skin></controller></library_controllers>"
+)
+
+
+def test_emission_and_skins_are_named_as_not_used(tmp_path: Path) -> None:
+    glow = "<emission><color>0 1 0 1</color></emission><diffuse>"
+    folder = edited(tmp_path, "<diffuse>", glow, material="paint")
+    assert read_mesh(folder, "a.dae").remarks == ("material 'paint': its emission is not used",)
+    dark = (tmp_path / "a.dae").read_text().replace("0 1 0 1</color></em", "0 0 0 1</color></em")
+    (tmp_path / "a.dae").write_text(dark)
+    assert read_mesh(folder, "a.dae").remarks == ()
+
+    text = dark.replace("<library_visual_scenes>", SKIN + "<library_visual_scenes>")
+    skinned = '<node id="man" name="man"><instance_controller url="#skin"/></node></node></visual'
+    (tmp_path / "a.dae").write_text(text.replace("</node></visual", skinned))
+    assert read_mesh(folder, "a.dae").remarks == ("'man' is skinned and is not read",)
+    alone = re.sub(r"<node id=.a.>.*?</node>", "", text.replace("</node></visual", skinned))
+    (tmp_path / "a.dae").write_text(
+        re.sub(r"(?s)<instance_geometry.*?/instance_geometry>", "", alone)
+    )
+    with pytest.raises(AssetError, match=r"holds no triangles \(skins are not read\)"):
+        read_mesh(folder, "a.dae")
 
 
 @pytest.mark.slow

@@ -191,6 +191,64 @@ def test_what_is_not_used_is_named_and_a_height_fields_file_not_opened(tmp_path:
     assert len(described.joints) > 3
 
 
+@pytest.mark.parametrize("aabb", ["false", "true"])
+@pytest.mark.parametrize("kind", ["box", "capsule", "cylinder", "sphere", "ellipsoid"])
+def test_primitives_are_fitted_to_their_meshes_as_mujoco_does(
+    tmp_path: Path, kind: str, aabb: str
+) -> None:
+    """Next to a geom that shows the same mesh, at a scale and turned, in a file or inline."""
+    placed = 'scale="2 1 0.5" refpos="0.1 0.2 0.3"'
+    points = "0 0 0  0.3 0 0  0 0.2 0  0 0 1"
+    text = f"""<mujoco><compiler fitaabb="{aabb}" meshdir="parts"/><asset>
+      <mesh name="wedge" file="wedge.obj" inertia="exact" {placed}/>
+      <mesh name="inline" vertex="{points}" inertia="convex"/></asset>
+    <worldbody><body name="b" pos="0 0 1"><geom type="mesh" mesh="wedge" group="2" contype="0"
+        conaffinity="0"/>
+      <geom type="{kind}" mesh="wedge" group="3" pos="0.1 0.2 0.3" euler="10 20 30"/>
+      <geom type="{kind}" mesh="inline" group="3" fitscale="0.9"/></body></worldbody></mujoco>"""
+    described = read_mjcf(write(tmp_path, text), "arm.xml")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+
+    (seen,) = described.links["b"].visuals
+    assert (seen.kind, seen.file) == ("mesh", "parts/wedge.obj")
+    assert described.included == ("parts/wedge.obj",)
+    shapes = described.links["b"].collisions
+    assert [shape.kind for shape in shapes] == [kind, kind]
+    for g, shape in enumerate(shapes, 1):
+        a, b, c = model.geom_size[g]
+        expected = {
+            "box": (2 * a, 2 * b, 2 * c),
+            "sphere": (a, 0.0, 0.0),
+            "ellipsoid": (a, b, c),
+        }.get(kind, (a, 2 * b, 0.0))
+        assert shape.size == pytest.approx(expected, abs=1e-6)
+        pose = poses_of(described, {})["b"] @ shape.T_link_shape
+        matrix = data.geom_xmat[g].reshape(3, 3)
+        np.testing.assert_allclose(pose.matrix()[:3, 3], data.geom_xpos[g], atol=1e-6)
+        np.testing.assert_allclose(pose.rotation(), matrix, atol=1e-5)
+
+
+def test_cameras_and_repeated_images_are_named_as_not_used(tmp_path: Path) -> None:
+    text = ARM.replace("</body></frame>", '<camera name="eye"/><light/></body></frame>')
+    text = text.replace('texture="wood" rgba', 'texture="wood" texrepeat="3 3" rgba')
+    text = text.replace('type="box"', 'type="box" material="wood"')
+    text = text.replace(
+        "</mujoco>",
+        '<actuator><motor joint="lift"/></actuator><sensor><jointpos joint="lift"/></sensor>'
+        "</mujoco>",
+    )
+    assert read_mjcf(write(tmp_path, text), "arm.xml").remarks == (
+        "not used: 1 actuator",
+        "not used: 1 camera",
+        "not used: 1 light",
+        "not used: 1 plane geom",
+        "not used: 1 repetition of an image (it is wrapped once around its shape)",
+        "not used: 1 sensor",
+    )
+
+
 def test_included_files_are_part_of_the_asset(tmp_path: Path) -> None:
     """A change of an included file changes the digest, as one of a mesh does."""
     write(tmp_path, ARM.replace("<default>\n", '<include file="looks.xml"/>\n<default>\n'))

@@ -122,6 +122,56 @@ def test_a_joint_without_limits_is_refused_with_remedy_unless_it_mimics_one(tmp_
         describe(tmp_path, link("a"), link("b"), joint("j", "a", "b", kind="revolute"))
 
 
+@pytest.mark.parametrize(("rgba", "base", "vertex"), [
+    ("1 0 0 1", (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
+    ("1 1 1 1", (1.0, 1.0, 1.0), (0.0, 1.0, 0.0)),
+])  # fmt: skip
+def test_a_colour_of_the_description_replaces_colours_of_vertices_but_white_does_not(
+    tmp_path: Path, rgba: str, base: tuple[float, ...], vertex: tuple[float, ...]
+) -> None:
+    """Red over green vertices is red, not their product, which is black."""
+    lines = [f"v {x} {y} 0 0 1 0" for x, y in ((0, 0), (1, 0), (0, 1))]
+    (tmp_path / "a.obj").write_text("\n".join([*lines, "f 1 2 3\n"]))
+    mesh = '<geometry><mesh filename="a.obj"/></geometry>'
+    material = f'<material name="m"><color rgba="{rgba}"/></material>'
+    described = describe(tmp_path, link("a", visual(material, mesh)))
+    soup = read_shape(Folder(tmp_path), described.links["a"].visuals[0], SE3()).soup
+    assert soup.slots[0].material.base_color == base
+    assert soup.colors is not None
+    assert (soup.colors == vertex).all()
+
+
+def test_colours_beyond_1_are_limited_and_named(tmp_path: Path) -> None:
+    """RViz limits them as well: of 255 0 0, red remains."""
+    own = '<material name="m"><color rgba="255 0 -1 1.5"/></material>'
+    described = describe(tmp_path, link("a", visual(own)))
+    (shape,) = described.links["a"].visuals
+    assert (shape.look.color, shape.look.opacity) == ((1.0, 0.0, 0.0), 1.0)
+    (remark,) = described.remarks
+    assert remark.startswith("rgba '255 0 -1 1.5':2:")
+    assert remark.endswith("is limited to [0, 1]")
+
+
+@pytest.mark.parametrize(("inside", "kind", "remark"), [
+    ('<limit effort="9" velocity="1"/>', "revolute",
+     "joint 'j':4:1 does not move: its limits are both 0"),
+    ('<limit lower="-inf" upper="inf"/>', "prismatic",
+     "joint 'j':4:1: limits of -inf and inf m are none; it stays at its origin"),
+    ('<limit lower="0" upper="1e16"/>', "prismatic",
+     "joint 'j':4:1: limits of 0 and 1e+16 m are none; it stays at its origin"),
+    ('<limit lower="0" upper="1"/><safety_controller soft_upper_limit="0.5" k_velocity="1"/>',
+     "revolute", "not used: 1 <safety_controller>"),
+])  # fmt: skip
+def test_limits_that_have_another_effect_than_their_numbers_are_named(
+    tmp_path: Path, inside: str, kind: str, remark: str
+) -> None:
+    described = describe(tmp_path, link("a"), link("b"), joint("j", "a", "b", inside, kind))
+    assert described.remarks == (remark,)
+    (found,) = described.joints
+    assert found.movable == ("stays" not in remark)
+    assert math.isfinite(found.lower) and math.isfinite(found.upper)
+
+
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 def test_floating_and_planar_joints_stay_at_their_origin(tmp_path: Path, kind: str) -> None:
     """The robot is read; a remark names the joint and its line."""

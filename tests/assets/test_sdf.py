@@ -86,6 +86,41 @@ def test_axes_are_in_the_named_frame(tmp_path: Path, axis: str, expected: list[f
     assert middle(described, "door", hinge=0.1) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(("version", "stated", "expected"), [
+    ("1.3", "", [1.0, 0.1, 0.5]),
+    ("1.4", "", [1.0, 0.1, 0.5]),
+    ("1.4", "<use_parent_model_frame>false</use_parent_model_frame>", [0.9, 0.0, 0.5]),
+    ("1.5", "", [0.9, 0.0, 0.5]),
+    ("1.6", "<use_parent_model_frame>True</use_parent_model_frame>", [1.0, 0.1, 0.5]),
+])  # fmt: skip
+def test_before_version_1_5_axes_are_in_the_frame_of_the_model(
+    tmp_path: Path, version: str, stated: str, expected: list[float]
+) -> None:
+    """As libsdformat converts such files (``sdf/1.5/1_4.convert``)."""
+    slide = HINGED[2].replace("revolute", "prismatic")
+    slide = slide.replace("<xyz>0 0 1</xyz>", f"<xyz>0 1 0</xyz>{stated}")
+    door = HINGED[1].replace(' relative_to="frame"', "").replace(">1 0 0 ", ">1 0 0.5 ")
+    read(tmp_path, HINGED[0], door, slide)
+    text = (tmp_path / "a.sdf").read_text().replace('version="1.9"', f'version="{version}"')
+    (tmp_path / "a.sdf").write_text(text)
+    described = read_sdf(Folder(tmp_path), "a.sdf")
+    assert middle(described, "door", hinge=0.1) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("tag", ["visual", "collision"])
+def test_poses_of_shapes_follow_the_frame_that_they_name(tmp_path: Path, tag: str) -> None:
+    """A link at (0, 0, 1), turned; its shape 1 m above a frame at (0, 0, 5), which follows it."""
+    text = (
+        f'<link name="a"><pose>0 0 1 0 0 1.5707963267948966</pose><{tag} name="v">'
+        f'<pose relative_to="mark">0.5 0 1 0 0 0</pose>{BOX}</{tag}></link>'
+        '<frame name="mark"><pose>0 0 5 0 0 0</pose></frame>'
+    )
+    described = read(tmp_path, text)
+    (shape,) = (*described.links["a"].visuals, *described.links["a"].collisions)
+    pose = poses_at(described)["a"] @ shape.T_link_shape
+    np.testing.assert_allclose(pose.matrix(), SE3((0.5, 0.0, 6.0)).matrix(), atol=1e-9)
+
+
 def test_poses_follow_frames_degrees_and_quaternions(tmp_path: Path) -> None:
     """A frame 1 m along X and turned by 90 degrees about Z; 1 m along its X is (1, 1, 0)."""
     described = read(
@@ -273,6 +308,8 @@ def test_what_is_not_used_is_named_and_a_loop_cut_after_its_first_joint(tmp_path
          "there is no link or frame 'dor'"),
         (link("x", '<pose relative_to="y">0 0 0 0 0 0</pose>'), "there is no frame 'y'"),
         (link("x", '<pose relative_to="x">0 0 0 0 0 0</pose>'), "relative to itself"),
+        ('<link name="x"><visual name="v"><pose relative_to="y">0 0 0 0 0 0</pose>' + BOX
+         + "</visual></link>", "there is no frame 'y'"),
         (link("x", "<pose>0 0 0</pose>"), r":2:\d+: .*link 'x': '0 0 0' is not 6 numbers"),
         (link("x").replace("0.2 0.4 0.6", "0.2 -0.4 0.6"), r":2:\d+: .*<box> has a negative"),
         (link("frame"), "link 'frame': its name is missing or used twice"),

@@ -230,6 +230,63 @@ def test_a_rectified_camera_is_the_pinhole_of_its_projection(tmp_path: Path) -> 
     assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == (0.0, 0.0, 0.0)
 
 
+REGION = """\
+binning_x: 2
+binning_y: 4
+roi: {x_offset: 100, y_offset: 40, height: 200, width: 300, do_rectify: false}
+"""
+
+
+@pytest.mark.parametrize("rectified", [False, True])
+def test_binned_images_of_a_region_of_ros_show_points_where_their_blocks_of_pixels_are(
+    tmp_path: Path, rectified: bool
+) -> None:
+    """Matrices and region refer to all pixels; pixel i is made of pixels 2 i and 2 i + 1, or 4."""
+    P = "p: [812.4, 0, 318.7, 0, 0, 811.9, 259.3, 0, 0, 0, 1, 0]\n"
+    content = MESSAGE.replace("---", P + REGION)
+    text = LENS.replace("}", ", rectified: true}") if rectified else LENS
+    with pytest.warns(ConfigWarning, match="not used: header, "):
+        found = sensor(tmp_path, text, content=content)
+
+    whole = project_cv(np.zeros(5) if rectified else D5)
+    # First pixels of blocks: a point in the middle of a block is at its pixel's centre.
+    blocks = (whole - (100, 40) + 0.5) / (2, 4) - 0.5
+    assert found.size_px == (150, 50)
+    assert_projects(found.nominal_intrinsics(), blocks)
+
+
+def test_a_message_of_ros_with_an_empty_region_and_no_binning_is_of_all_pixels(
+    tmp_path: Path,
+) -> None:
+    content = MESSAGE.replace("---", REGION.replace("2", "0").replace("4", "0").replace("3", "0"))
+    content = content.replace("100", "0").replace("binning_x: 0", "binning_x: 1")
+    with pytest.warns(ConfigWarning, match="not used: header$"):
+        found = sensor(tmp_path, LENS, content=content)
+    assert found.size_px == (640, 512)
+    assert_projects(found.nominal_intrinsics(), project_cv(D5))
+
+
+@pytest.mark.parametrize(("content", "fact"), [
+    ("K: [812.4, 0, 0, 0, 811.9, 0, 318.7, 259.3, 1]",
+     "camera.yaml:1:4: camera matrix: its third row is 318.7 259.3 1, expected 0 0 1; transpose"),
+    ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 2]", "its third row is 0 0 2, expected 0 0 1"),
+    ("K: [812.4, 0, 318.7, 1.5, 811.9, 259.3, 0, 0, 1]", "skew 1.5 has no place in a camera here"),
+    ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\nxi: 1.2\nD: [0.1, 0.2, 0, 0]",
+     "camera.yaml:2:5: xi: omnidirectional lenses have no lens here"),
+    (ROS % ("none", 5, D5.tolist()), "are not 0, but the lens is 'none'"),
+    (KALIBR.replace("radtan", "none").partition("cam1:")[0], "are not 0, but the lens is 'none'"),
+    (MESSAGE.replace("---", "binning_x: 1.5"), "binning_x: expected a whole number"),
+])  # fmt: skip
+def test_numbers_that_no_lens_here_has_are_refused(tmp_path: Path, content: str, fact: str) -> None:
+    assert fact in told(tmp_path, LENS, content=content)
+
+
+def test_a_height_before_the_width_is_pointed_out(tmp_path: Path) -> None:
+    content = "image_size: [512, 640]\nK: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\n"
+    with pytest.warns(ConfigWarning, match=r"\(318\.7, 259\.3\) is far from the middle of 512 x"):
+        sensor(tmp_path, LENS, content=content)
+
+
 def test_cameras_of_a_kalibr_chain_project_as_opencv_does(tmp_path: Path) -> None:
     first = sensor(tmp_path, LENS.replace("}", ", camera: cam0}"), content=KALIBR)
     other = sensor(tmp_path, LENS.replace("}", ", camera: cam1}"), content=KALIBR)
@@ -357,6 +414,27 @@ def test_a_kalibr_chain_places_cameras_from_the_first(tmp_path: Path) -> None:
 
     np.testing.assert_allclose(rig_pose(zero), OPTICAL, atol=1e-9)
     np.testing.assert_allclose(rig_pose(one), OPTICAL @ np.linalg.inv(T_C1_C0), atol=1e-6)
+
+
+def long_chain(numbers: Any) -> str:
+    """Cameras in a row, each 0.1 m to the right of the one before, listed by the alphabet."""
+    text = ""
+    for name in sorted(f"cam{k}" for k in numbers):
+        camera = KALIBR.partition("cam1:")[0].replace("cam0", name)
+        shift = "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+        text += camera + (shift if name != "cam0" else "")
+    return text
+
+
+@pytest.mark.parametrize(("frame", "y_m"), [("cam2", -0.2), ("cam10", -1.0), ("cam11", -1.1)])
+def test_cameras_of_a_kalibr_chain_follow_their_numbers(
+    tmp_path: Path, frame: str, y_m: float
+) -> None:
+    """Kalibr's files list ``cam10`` before ``cam2``."""
+    content = long_chain(range(12))
+    assert content.index("cam10") < content.index("cam2:")
+    found = mounted(tmp_path, f"frame: {frame}", "chain.yaml", content)
+    assert found.offset_m == pytest.approx((0.0, y_m, 0.0))
 
 
 IMU = """\
@@ -495,11 +573,56 @@ def test_a_kitti_calibration_places_from_the_scanner(
     )
 
 
+RAW = """\
+S_rect_02: 1.242e+03 3.75e+02
+R_rect_00: 9.999239e-01 9.837760e-03 -7.445048e-03 -9.869795e-03 9.999421e-01 -4.278459e-03 \
+7.402527e-03 4.351614e-03 9.999631e-01
+P_rect_02: 7.215377e+02 0 6.095593e+02 4.485728e+01 0 7.215377e+02 1.728540e+02 2.163791e-01 \
+0 0 1 2.745884e-03
+"""
+VELODYNE = """\
+R: 7.533745e-03 -9.999714e-01 -6.166020e-04 1.480249e-02 7.280733e-04 -9.998902e-01 9.998621e-01 \
+7.523790e-03 1.480755e-02
+T: -4.069766e-03 -7.631618e-02 -2.717806e-01
+"""
+
+
+def test_rectified_cameras_and_the_scanner_of_kittis_raw_data_are_placed_in_one_frame(
+    tmp_path: Path,
+) -> None:
+    """Points of the scanner through ``P_rect_02 R_rect_00 Tr`` are where the camera sees them.
+
+    Two files, as KITTI has them; without R_rect_00, which turns by 0.75 degrees, they miss by 5 px.
+    """
+    text = ("rig: r, lens: {model: calibrated, file: FILE, camera: camera_2, rectified: true},"
+            " mounting: {file: FILE, frame: camera_2, rectified: true}")  # fmt: skip
+    eye = sensor(tmp_path, text, "calib_cam_to_cam.txt", content=RAW)
+    scanner = mounted(tmp_path, "frame: velodyne", "calib_velo_to_cam.txt", VELODYNE)
+
+    P, rect, R, T = (
+        np.array([float(word) for word in line.split()[1:]])
+        for line in (*(RAW.splitlines()[k] for k in (2, 1)), *VELODYNE.splitlines())
+    )
+    points_m = np.array([[12.0, 1.5, -0.5], [30.0, -4.0, 0.2], [8.0, 2.0, -1.5]])
+    in_camera_0 = points_m @ R.reshape(3, 3).T + T
+    rectified = np.column_stack([in_camera_0 @ rect.reshape(3, 3).T, np.ones(3)])
+    expected = rectified @ P.reshape(3, 4).T
+    in_rig = scanner.T_rig_sensor.apply(points_m)
+    seen = np.linalg.inv(rig_pose(eye)) @ np.column_stack([in_rig, np.ones(3)]).T
+    np.testing.assert_allclose(
+        eye.nominal_intrinsics().project(seen[:3].T),
+        expected[:, :2] / expected[:, 2:] + 0.5,
+        atol=0.01,
+    )
+
+
 @pytest.mark.parametrize(("text", "name", "content", "fact"), [
     ("frame: cam9", "chain.yaml", KALIBR, "has no frame 'cam9'; expected one of cam0, cam1"),
     ("frame: cam1, relative_to: imu", "chain.yaml", KALIBR, "has no frame 'imu'"),
     ("frame: cam1, axes: sideways", "chain.yaml", KALIBR, "expected one of optical, body"),
     ("frame: cam1", "chain.yaml", KALIBR.replace("0.9998", "0.7"), "T_cn_cnm1: is not a rotation"),
+    ("frame: cam3", "chain.yaml", long_chain((0, 1, 3)),
+     "cam3.T_cn_cnm1: refers to cam2, which the file lacks"),
     ("frame: a", "tf.yaml", TF.replace("w: 0.8", "w: 1.8"), "is not a unit quaternion"),
     ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="'), "expected three numbers"),
     ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>"),

@@ -1,7 +1,8 @@
 """COLLADA 1.4 and 1.5 (``.dae``), by pycollada.
 
 Geometry of the scene's nodes in metres, in the axes of the file; ``MeshSource.up`` names the
-axis that it states as up. Animations, skins, lights and cameras are not read.
+axis that it states as up. Colours of vertices are sRGB factors on the colour of a material.
+Animations, skins, lights and cameras are not read.
 """
 
 import io
@@ -15,9 +16,9 @@ from xml.etree.ElementTree import fromstring, tostring
 import numpy as np
 
 from gen_data.assets.asset_folder import Folder
-from gen_data.assets.readers.mesh_source import MeshSource, locate_file, srgb_to_linear
+from gen_data.assets.readers.mesh_source import WHITE, MeshSource, locate_file, srgb_to_linear
 from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
-from gen_data.core import asset_types, errors, safe_xml, se3
+from gen_data.core import asset_types, colorimetry, errors, safe_xml, se3
 
 _MAX_ELEMENTS = 1_000_000
 _UP = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}
@@ -51,14 +52,17 @@ def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
                 document = Collada(io.BytesIO(mended), ignore=tolerated)
             soups = [
                 _make_soup(folder, relative, document, *part, remarks if materials else None)
-                for part in enumerate(_placed_geometries(document))
+                for part in enumerate(_placed_geometries(document, remarks))
             ]
     except (DaeError, ValueError, LookupError, TypeError, AttributeError) as error:
         reason = str(error).strip().split("\n")[0][:200] or type(error).__name__
         raise errors.AssetError(f"{place}: malformed COLLADA ({reason}); export it again") from None
     parts = [soup for group in soups for soup in group]
     if not parts:
-        raise errors.AssetError(f"{place}: holds no triangles; export it again with its faces")
+        skinned = " (skins are not read)" if _SKINNED in " ".join(remarks) else ""
+        raise errors.AssetError(
+            f"{place}: holds no triangles{skinned}; export it again with its faces"
+        )
     up = _UP.get(str(document.assetInfo.upaxis), "y")
     return MeshSource(join_soups(parts), remarks=tuple(dict.fromkeys(remarks)), up=up)
 
@@ -74,8 +78,13 @@ def _without_broken_materials(data: bytes, known: set[str]) -> bytes:
     return tostring(root)
 
 
-def _placed_geometries(document: Any) -> Iterator[tuple[str, Any, Float64, dict[str, Any]]]:
-    """Yield name, geometry, its affine map [3, 4] to the scene and its materials by symbol.
+_SKINNED = "is skinned and is not read"
+
+
+def _placed_geometries(
+    document: Any, remarks: list[str]
+) -> Iterator[tuple[str, Any, Float64, dict[str, Any]]]:
+    """Yield name, geometry, its affine map [3, 4] to the scene and its bound materials by symbol.
 
     The name is the node's, which tools show and descriptions refer to.
     """
@@ -83,21 +92,26 @@ def _placed_geometries(document: Any) -> Iterator[tuple[str, Any, Float64, dict[
         for geometry in document.geometries:
             yield "", geometry, np.eye(4)[:3], {}
         return
-    for name, bound in _bound_geometries(document.scene.nodes, None, ""):
-        nodes = {symbol: node.target for symbol, node in bound.materialnodebysymbol.items()}
-        yield name, bound.original, np.asarray(bound.matrix, np.float64)[:3], nodes
+    for name, bound in _bound_geometries(document.scene.nodes, None, "", remarks):
+        matrix = np.asarray(bound.matrix, np.float64)[:3]
+        yield name, bound.original, matrix, dict(bound.materialnodebysymbol)
 
 
-def _bound_geometries(nodes: Any, matrix: Any, name: str) -> Iterator[tuple[str, Any]]:
+def _bound_geometries(
+    nodes: Any, matrix: Any, name: str, remarks: list[str]
+) -> Iterator[tuple[str, Any]]:
     """Geometries below nodes, each with the name of the nearest node around it that has one."""
-    from collada.scene import Node, NodeNode
+    from collada.scene import ControllerNode, Node, NodeNode
 
     for node in nodes:
         if isinstance(node, NodeNode):
-            yield from _bound_geometries([node.node], matrix, name)
+            yield from _bound_geometries([node.node], matrix, name, remarks)
         elif isinstance(node, Node):
             here = node.matrix if matrix is None else np.dot(matrix, node.matrix)
-            yield from _bound_geometries(node.children, here, str(node.name or node.id or name))
+            inner = str(node.name or node.id or name)
+            yield from _bound_geometries(node.children, here, inner, remarks)
+        elif isinstance(node, ControllerNode):
+            remarks.append(f"'{name[:60]}' {_SKINNED}")
         else:
             for bound in node.objects("geometry", matrix):
                 yield name, bound
@@ -126,8 +140,8 @@ def _make_soup(
         triangles = primitive.triangleset() if isinstance(primitive, Polylist) else primitive
         if not isinstance(triangles, TriangleSet) or not len(triangles):
             continue
-        slot = MaterialSlot()
-        target = bound.get(triangles.material)
+        slot, node_of = MaterialSlot(), bound.get(triangles.material)
+        target = None if node_of is None else node_of.target
         if remarks is not None and target is not None:
             linear = any(
                 _LINEAR_WRITER in (c.authoring_tool or "") for c in document.assetInfo.contributors
@@ -136,17 +150,46 @@ def _make_soup(
         soup = TriangleSoup.of(_rows(triangles.vertex, triangles.vertex_index), slot)
         uvs = normals = None
         if triangles.texcoordset:
-            uvs = _rows(triangles.texcoordset[0], triangles.texcoord_indexset[0])[..., :2]
+            k = _texture_set(triangles, node_of)
+            uvs = _rows(triangles.texcoordset[k], triangles.texcoord_indexset[k])[..., :2]
         if triangles.normal is not None:
             normals = _rows(triangles.normal, triangles.normal_index)
+        colors = None if remarks is None else _vertex_colors(triangles, slot, remarks)
+        if colors is not None and not slot.from_file:
+            soup = replace(soup, slots=(replace(slot, material=WHITE, from_file=True),))
         name = node or str(geometry.name or geometry.id or f"geometry_{number}")
-        soup = replace(soup, uvs=uvs, normals=normals, group_names=(name,))
+        soup = replace(soup, uvs=uvs, normals=normals, colors=colors, group_names=(name,))
         soups.append(soup.transformed(matrix))
     if len(soups) < 2:
         return soups
     joined = join_soups(soups)
     one = np.zeros_like(joined.face_groups)
     return [replace(joined, face_groups=one, group_names=soups[0].group_names)]
+
+
+def _texture_set(triangles: Any, bound: Any) -> int:
+    """Number of the set of texture coordinates that the diffuse image of a material is bound to."""
+    wanted = getattr(bound.target.effect.diffuse, "texcoord", None) if bound is not None else None
+    for symbol, semantic, number in bound.inputs if bound is not None else ():
+        if (symbol, semantic) == (wanted, "TEXCOORD"):
+            sets = [one[3] or "0" for one in triangles.sources["TEXCOORD"]]
+            return sets.index(number or "0") if (number or "0") in sets else 0
+    return 0
+
+
+def _vertex_colors(triangles: Any, slot: MaterialSlot, remarks: list[str]) -> Float64 | None:
+    """Linear RGB [m, 3, 3] of corners; None without colours, or where an image is."""
+    inputs = triangles.sources.get("COLOR")
+    if not inputs:
+        return None
+    if slot.material.texture:
+        remarks.append("vertex colours are not used where an image is")
+        return None
+    offset, _, _, _, source = inputs[0]
+    srgb = _rows(source.data, triangles.index[:, :, offset])[..., :3]
+    if srgb.shape[-1] < 3 or not np.isfinite(srgb).all():
+        raise ValueError("a vertex colour that is not three finite numbers")
+    return colorimetry.srgb_decode(np.clip(srgb, 0.0, 1.0))
 
 
 def _rows(table: Any, indices: Any) -> Float64:
@@ -164,6 +207,9 @@ def _read_material(
     effect = target.effect
     name = str(target.name or target.id or "")
     material = asset_types.Material(opacity=_read_opacity(effect))
+    glow = effect.emission
+    if getattr(glow, "sampler", None) is not None or any((glow or ())[:3]):
+        remarks.append(f"material '{name[:40]}': its emission is not used")
     image = getattr(effect.diffuse, "sampler", None)
     if image is not None:
         path = unquote(image.surface.image.path.removeprefix("file://"))

@@ -168,11 +168,22 @@ def camera_matrix(node: Node, name: str, columns: int = 3) -> tuple[float, float
         ConfigError: it is not the matrix of a camera without skew.
     """
     K = np.array(numbers(node, [3 * columns], name)).reshape(3, columns)
+    check_matrix(K, node, name)
+    return (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
+
+
+def check_matrix(K: se3.Array, node: Node, name: str) -> None:
+    """Raise ConfigError unless a matrix [3, 3 or 4] is ``fx 0 cx, 0 fy cy, 0 0 1``."""
     if min(K[0, 0], K[1, 1]) <= 0.0:
         fail(node, name, f"focal lengths must be positive, got {K[0, 0]:g} and {K[1, 1]:g}")
-    if abs(K[0, 1]) > 1e-9 * K[0, 0]:
-        fail(node, name, f"skew {K[0, 1]:g} has no place in a camera here; expected 0")
-    return (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
+    if np.abs(K[2, :3] - (0.0, 0.0, 1.0)).max() > 1e-9:
+        row = " ".join(f"{value:g}" for value in K[2, :3])
+        hint = "; transpose it: MATLAB's intrinsic matrix has these numbers in its columns"
+        fact = f"its third row is {row}, expected 0 0 1"
+        fail(node, name, fact + (hint if max(np.abs(K[:2, 2])) == 0.0 else ""))
+    if max(abs(K[0, 1]), abs(K[1, 0])) > 1e-9 * K[0, 0]:
+        skew = K[0, 1] or K[1, 0]
+        fail(node, name, f"skew {skew:g} has no place in a camera here; expected 0")
 
 
 def rigid(values: Sequence[float], node: Node, name: str) -> se3.SE3:

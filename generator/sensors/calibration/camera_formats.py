@@ -9,7 +9,9 @@
 Pixel centres are at integers in all but COLMAP's, where they are at halves, as in this project.
 """
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -123,7 +125,7 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
         found = read(entries, number, size_px, fisheye)
         if found is not None:
             camera, frame = found
-            cameras[number or single] = camera
+            cameras[number or single] = _read_out(camera, entries)
             frames |= {} if frame is None else {"rectified": Frame(optical=True)}
             frames |= {} if frame is None else {number or single: frame}
     if not cameras:
@@ -154,11 +156,64 @@ def _read_camera(
         fact = f"'{name}' is not a known lens; expected one of {known}{did_you_mean(name, _MODELS)}"
         fail(stated, "distortion_model", fact)
     model = "kannala_brandt" if fisheye else _MODELS[name]
+    _refuse_omnidirectional(entries, number)
     lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
     if D is not None and model != "pinhole":
         count = (4,) if model == "kannala_brandt" else (0, 4, 5, 8, 12, 14)
         lens = lens_of(model, numbers(D, count, "distortion coefficients"), D, "distortion")
+    elif D is not None:
+        _refuse_coefficients(D, "distortion coefficients")
     return CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size_px), None
+
+
+def _refuse_omnidirectional(entries: _Entries, number: str) -> None:
+    """Raise ConfigError for a camera of OpenCV's omnidir module, whose parameter xi is not 0."""
+    xi = entries.take(("xi", "Xi", "XI"), number)
+    if xi is not None and any(numbers(xi, [1], "xi")):
+        fact = "omnidirectional lenses have no lens here; calibrate with the fisheye module"
+        fail(xi, "xi", fact)
+
+
+def _refuse_coefficients(D: Node, name: str) -> None:
+    """Raise ConfigError for coefficients other than 0 of a lens that is stated to have none."""
+    values = numbers(D, range(15), name) if D.items or D.get("data") else []
+    if any(values):
+        fail(D, name, "are not 0, but the lens is 'none'; state the model that they belong to")
+
+
+def _read_out(camera: CalibratedCamera, entries: _Entries) -> CalibratedCamera:
+    """A camera of which a region of interest is read out, or blocks of pixels together.
+
+    Source: ROS, sensor_msgs/CameraInfo: matrices and the region refer to all pixels. Pixel i of
+    binned images covers the pixels ``[i * b, (i + 1) * b)``, so its edges scale, not its centres.
+    """
+    bins = [_whole(entries.root, f"binning_{axis}") or 1 for axis in "xy"]
+    entries.used |= {"binning_x", "binning_y"}
+    region = entries.take(("roi",))
+    corner, size = [0, 0], camera.size_px
+    if region is not None:
+        corner = [_whole(region, f"{axis}_offset") for axis in "xy"]
+        width, height = (_whole(region, side) for side in ("width", "height"))
+        size = (width, height) if width and height else size
+    if size is not None:
+        size = (size[0] // bins[0], size[1] // bins[1])
+    (fx, fy), (cx, cy) = camera.focal_px, camera.center_px
+    centers = [(c - at + 0.5) / b - 0.5 for c, at, b in zip((cx, cy), corner, bins, strict=True)]
+    if bins == [1, 1] and corner == [0, 0]:
+        return replace(camera, size_px=size)
+    focal = (fx / bins[0], fy / bins[1])
+    return replace(camera, focal_px=focal, center_px=(centers[0], centers[1]), size_px=size)
+
+
+def _whole(node: Node, key: str) -> int:
+    """A count of pixels; 0 if it is absent."""
+    found = node.get(key)
+    if found is None:
+        return 0
+    (value,) = numbers(found, [1], key)
+    if value < 0 or value != int(value):
+        fail(found, key, f"expected a whole number of at least 0, got {value:g}")
+    return int(value)
 
 
 def _read_rectified(
@@ -219,7 +274,8 @@ def kalibr_chain(root: Node) -> Calibration:
     """Kalibr's camera chain, with or without an IMU.
 
     Without ``relative_to``, mounts refer to the first camera. ``T_cn_cnm1`` takes points of the
-    camera before to a camera, ``T_cam_imu`` points of the IMU.
+    camera before to a camera, ``T_cam_imu`` points of the IMU. Cameras ``cam0``, ``cam1``, ... are
+    in the order of their numbers: files list them by the alphabet, ``cam10`` before ``cam2``.
 
     Raises:
         ConfigError: a camera's model has no counterpart here, or an entry is malformed.
@@ -227,7 +283,9 @@ def kalibr_chain(root: Node) -> Calibration:
     cameras: dict[str, CalibratedCamera] = {}
     frames: dict[str, Frame] = {}
     unused: list[str] = []
-    chain = [name for name, node in root.entries.items() if node.get("camera_model")]
+    named = [name for name, node in root.entries.items() if node.get("camera_model")]
+    numbered = all(_NUMBERED.fullmatch(name) for name in named)
+    chain = sorted(named, key=lambda name: int(name[3:])) if numbered else named
     for name in chain:
         node = root.entries[name]
         entries = _Entries(node)
@@ -237,7 +295,11 @@ def kalibr_chain(root: Node) -> Calibration:
         frames.setdefault(name, Frame(optical=True))
         if before is not None and name != chain[0]:
             pose = rigid(numbers(before, [12, 16], "T_cn_cnm1"), before, "T_cn_cnm1").inverse()
-            frames[name] = Frame(chain[chain.index(name) - 1], pose, optical=True)
+            parent = chain[chain.index(name) - 1]
+            if numbered and int(parent[3:]) != int(name[3:]) - 1:
+                fact = f"refers to cam{int(name[3:]) - 1}, which the file lacks"
+                fail(before, f"{name}.T_cn_cnm1", fact)
+            frames[name] = Frame(parent, pose, optical=True)
         T_cam_imu = _imu_pose(imu, inverse)
         if T_cam_imu is not None and "imu" not in frames:
             frames["imu"] = Frame(name, T_cam_imu)
@@ -246,6 +308,9 @@ def kalibr_chain(root: Node) -> Calibration:
         unused += [f"{name}.{key}" for key in entries.unused()]
     unused += [key for key in root.entries if key not in chain]
     return Calibration(root.position.file, "a camera chain of Kalibr", cameras, frames, unused)
+
+
+_NUMBERED = re.compile(r"cam\d+")
 
 
 def _imu_pose(T_cam_imu: Node | None, T_imu_cam: Node | None) -> SE3 | None:
@@ -284,6 +349,8 @@ def _kalibr_camera(entries: _Entries) -> CalibratedCamera:
             fail(entries.root, "distortion_coeffs", "is missing")
         values = numbers(coefficients, [4], "distortion_coeffs")
         lens = lens_of(_MODELS[name], values, coefficients, "distortion_coeffs")
+    elif coefficients is not None:
+        _refuse_coefficients(coefficients, "distortion_coeffs")
     return CalibratedCamera(given.position, (fx, fy), (cx, cy), *lens, size_px=_size_px(entries))
 
 

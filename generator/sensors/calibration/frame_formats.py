@@ -6,12 +6,14 @@
   ego vehicle's: on the ground below the middle of the rear axle. Cameras have Z forward; the
   laser scanner has Y forward.
 * KITTI: ``calib/000000.txt`` of the benchmarks and ``calib_*.txt`` of raw data. Frames are
-  ``camera_2`` (0 to 3), ``velodyne`` and ``imu``; X forward but for cameras.
+  ``camera_2`` (0 to 3), ``velodyne`` and ``imu``; X forward but for cameras. The root of the
+  rectified cameras of raw data is ``unrectified``: camera 0 before its rectification.
 """
 
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -152,9 +154,12 @@ def _nuscenes_frame(record: Mapping[str, Any], modality: str, path: Path) -> cal
 
 
 def _nuscenes_camera(record: Mapping[str, Any], path: Path) -> calibration.CalibratedCamera:
-    (fx, _, cx), (_, fy, cy), _ = record["camera_intrinsic"]
+    K = np.array(record["camera_intrinsic"], np.float64).reshape(3, 3)
     place = Position(str(path), 1, 1)
-    return calibration.CalibratedCamera(place, (float(fx), float(fy)), (float(cx), float(cy)))
+    calibration.check_matrix(K, Node(place, ()), f"camera_intrinsic of {record['token']}")
+    return calibration.CalibratedCamera(
+        place, (float(K[0, 0]), float(K[1, 1])), (float(K[0, 2]), float(K[1, 2]))
+    )
 
 
 def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> calibration.Calibration:
@@ -174,13 +179,15 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> calib
         key = _NAMES.get(key.rstrip(":"), key.rstrip(":"))
         if key:
             lines[key] = Node(place, cells, text=rest.strip())
-    frames, cameras = {"camera_0": calibration.Frame(optical=True)}, {}
+    raw = rectified and any(key.startswith("P_rect_") for key in lines)
+    root = "unrectified" if raw else "camera_0"
+    frames, cameras = {root: calibration.Frame(optical=True)}, {}
     used = {"calib_time", "corner_dist"}
     for number in "0123":
         name = f"camera_{number}"
         for camera, frame, keys in _kitti_camera(lines, number, rectified=rectified):
             cameras[name], used = camera, used | keys
-            if number != "0":
+            if name != root:
                 frames[name] = frame
     used |= _kitti_devices(lines, frames)
     if not cameras and len(frames) < 2:
@@ -205,7 +212,11 @@ def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) ->
         fx, fy, cx, cy = calibration.camera_matrix(P, "P", 4)
         keys = {f"P{number}", f"P_rect_0{number}", f"S_rect_0{number}"}
         camera = calibration.CalibratedCamera(P.position, (fx, fy), (cx, cy), size_px=size)  # type: ignore[arg-type]
-        yield camera, camera_formats.shifted(P, "camera_0"), keys
+        frame = camera_formats.shifted(P, "camera_0")
+        if f"P{number}" not in lines:
+            frame = _kitti_unrectified(lines, frame)
+            keys |= {f"R_rect_0{k}" for k in "0123"}
+        yield camera, frame, keys
         return
     K, D = lines.get(f"K_0{number}"), lines.get(f"D_0{number}")
     R, T = lines.get(f"R_0{number}"), lines.get(f"T_0{number}")
@@ -220,6 +231,22 @@ def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) ->
     keys = {f"{name}_0{number}" for name in "SKDRT"}
     camera = calibration.CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size)  # type: ignore[arg-type]
     yield camera, calibration.Frame("camera_0", pose, optical=True), keys
+
+
+def _kitti_unrectified(lines: Mapping[str, Node], frame: calibration.Frame) -> calibration.Frame:
+    """Frame of a rectified camera of raw data in camera 0 as it is, which the scanner refers to.
+
+    Source: KITTI's raw development kit: ``P_rect_xx R_rect_00 Tr_velo_to_cam`` takes points of the
+    scanner to image ``xx``, so ``R_rect_00`` rectifies all cameras.
+    """
+    turn = lines.get("R_rect_00")
+    if turn is None:
+        return replace(frame, parent="unrectified")
+    rows = np.array(calibration.numbers(turn, [9], "R_rect_00")).reshape(3, 3)
+    calibration.check_rotation(rows, turn, "R_rect_00")
+    T_rect_0 = SE3.from_matrix(np.column_stack([rows, np.zeros(3)]))
+    pose = T_rect_0.inverse() @ frame.T_parent_frame
+    return replace(frame, parent="unrectified", T_parent_frame=pose)
 
 
 def _kitti_devices(lines: Mapping[str, Node], frames: dict[str, calibration.Frame]) -> set[str]:

@@ -60,6 +60,7 @@ def _load_lens(sensor: Node, lens: Node, field: str) -> dict[str, Node]:
         camera = calibration.camera(asked.camera)
     except ValueError as error:
         refuse((lens.get("camera") or file).position, f"{field}.lens.camera", str(error))
+    _warn_of_swapped_size(camera, file.text)
     place = camera.position
     found = {
         "lens": _node(place, _lens_entries(camera)),
@@ -106,6 +107,24 @@ def _read(file: Node, field: str, *, fisheye: bool = False, rectified: bool = Fa
         message = f"{path}: {calibration.kind}; not used: {listed}"
         warnings.warn(message, errors.ConfigWarning, stacklevel=2)
     return calibration
+
+
+def _warn_of_swapped_size(camera: CalibratedCamera, file: str) -> None:
+    """Warn of a size that is far from its principal point and near to it with its sides swapped.
+
+    numpy states the height of an image first.
+    """
+    if camera.size_px is None or camera.size_px[0] == camera.size_px[1]:
+        return
+    (cx, cy), (width, height) = camera.center_px, camera.size_px
+    given = max(abs(cx / width - 0.5), abs(cy / height - 0.5))
+    swapped = max(abs(cx / height - 0.5), abs(cy / width - 0.5))
+    if given > 0.12 and swapped < 0.06:
+        message = (
+            f"{file}: the principal point ({cx:g}, {cy:g}) is far from the middle of {width} x "
+            f"{height} pixels; is the size height before width?"
+        )
+        warnings.warn(message, errors.ConfigWarning, stacklevel=2)
 
 
 def _check_alone(sensor: Node, key: str, field: str) -> None:
