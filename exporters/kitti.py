@@ -30,7 +30,8 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   silhouette inside the image, with limits defined here; nothing is unknown, and 3 is not used.
   COCO's key ``occlusion`` has the share itself.
 * **Points** come from the data set's laser scanner, or of its ``pseudo_lidar``; without either
-  there is no velodyne folder, which some readers require.
+  there is no velodyne folder, which some readers require. They are turned about the scanner's z
+  where its x axis does not point along the camera's optical axis (``gen_data.exporters.velodyne``).
 * **Point labels** are an extension. They follow KITTI's rule that an object is the content of its
   box: a point of an object has no row if noise, or the object's motion between the pulse and the
   instant of its box, moved it more than 3 cm out of the box; every point as deep inside has the
@@ -51,11 +52,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.core import capture, intrinsics, scene, se3
+from gen_data.core import capture, intrinsics, scene, scene_time, se3
 from gen_data.core.boxes import BoxPx
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.exporters import base, image_files, point_cloud_io, sensor_selection
+from gen_data.exporters import base, image_files, point_cloud_io, sensor_selection, velodyne
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.kitti_boxes import UprightBox, members_in_box, upright_box
 from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
@@ -152,15 +153,16 @@ class Kitti(base.ExporterBase):
             truth = sample.truth[camera]
             frame = _frame_name(sample.index)
             rows = label_rows(truth, self)
-            T_camera_velo = self._velodyne_pose(info, sample)
-            calib = calib_text(truth.camera.intrinsics, T_camera_velo)
+            T_camera_lidar = self._scanner_pose(info, sample, true=True)
+            turn = velodyne.turn_ahead(T_camera_lidar.rotation()[2])
+            T_camera_velo = velodyne.turned_pose(self._scanner_pose(info, sample), turn)
+            calib = calib_text(truth.camera.intrinsics, T_camera_velo.matrix()[:3])
             write_text(folder / f"calib/{frame}.txt", calib)
             lidar = self._lidar(info)
             if sensor_selection.has_scans(shard_dir, lidar, sample.index):
                 points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
-                write_bytes(folder / f"velodyne/{frame}.bin", point_cloud_io.xyzi_bytes(points))
-                T_camera_velo = self._velodyne_pose(info, sample, true=True)
-                members, unseen = point_members(points, truth, rows, T_camera_velo)
+                write_bytes(folder / f"velodyne/{frame}.bin", velodyne.scan_bytes(points, turn))
+                members, unseen = point_members(points, truth, rows, T_camera_lidar.matrix()[:3])
                 rows = without_returns(rows, unseen, truth)
                 labels = point_labels(points, members, rows)
                 write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
@@ -189,13 +191,13 @@ class Kitti(base.ExporterBase):
     def _lidar(self, info: DatasetInfo) -> str:
         return sensor_selection.laser_scanner(info, self.lidar, self.type)
 
-    def _velodyne_pose(self, info: DatasetInfo, sample: Sample, *, true: bool = False) -> se3.Array:
-        """``T_camera_velo`` of the velodyne folder's points, [3, 4], as calibrated or ``true``."""
+    def _scanner_pose(self, info: DatasetInfo, sample: Sample, *, true: bool = False) -> se3.SE3:
+        """``T_camera_lidar``, as calibrated or ``true``; without a scanner, one at the camera."""
         lidar = self._lidar(info)
         if lidar:
             camera = self._camera(info)
-            return point_cloud_io.T_camera_lidar(sample, camera, lidar, true=true)[:3]
-        return T_CAMERA_FORWARD
+            return point_cloud_io.T_camera_lidar(sample, camera, lidar, true=true)
+        return scene_time.RIG_AXES
 
     def _links(
         self, info: DatasetInfo, camera: str, shard_dir: Path, index: int
@@ -468,7 +470,8 @@ _BOXES = {
     "tight": "around the visible pixels",
 }
 _SCANNED = """\
-velodyne    Points of '{lidar}'; float32 x y z reflectance [0, 1].
+velodyne    Points of '{lidar}'; float32 x y z reflectance [0, 1]. X is ahead of the camera, Y
+            left, Z up: a scanner that looks elsewhere is turned about its z axis.
 velodyne_labels  One uint32 per point: lower half the category id of the reflector, upper half
             row in label_2, from 1; 0 = no row. A point belongs to the object whose box it is in:
             points that range noise took more than 3 cm out have no row.

@@ -16,8 +16,9 @@
   becomes the next date.
 * The cameras of a drive are parallel: the images are rectified. The reference is camera 00, or 02
   without grey cameras; missing cameras have the matrices of the reference.
-* Points, boxes and ``oxts`` are exact; each drive starts at noon. ``gen_data.exporters.oxts`` and
-  ``gen_data.exporters.tracklets`` describe their files.
+* Points, boxes and ``oxts`` are exact; each drive starts at noon. ``gen_data.exporters.oxts``,
+  ``gen_data.exporters.tracklets`` and, for the axes of scans, ``gen_data.exporters.velodyne``
+  describe their files.
 
 Reference: Geiger et al., "Vision meets Robotics: The KITTI Dataset", IJRR 2013.
 """
@@ -39,7 +40,15 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import SE3, Array, Vec3
-from gen_data.exporters import base, image_files, png, point_cloud_io, sensor_selection, tracklets
+from gen_data.exporters import (
+    base,
+    image_files,
+    png,
+    point_cloud_io,
+    sensor_selection,
+    tracklets,
+    velodyne,
+)
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.oxts import COLUMNS, navigation_mount, oxts_row, rig_motion
 from gen_data.exporters.sequences import (
@@ -48,7 +57,6 @@ from gen_data.exporters.sequences import (
     camera_mount,
     check_sequence_count,
     frame_facts,
-    lidar_mount,
     matrix_numbers,
     read_sequences,
     relative_pose,
@@ -182,6 +190,7 @@ class KittiRaw(base.ExporterBase):
         carrier = camera_mount(sample.scene, cameras["02"]).rig
         unit = navigation_mount(sample.scene, self.oxts, carrier, self.type)
         truly = navigation_mount(sample.scene, self.oxts, carrier, self.type, true=True)
+        turn = velodyne.turn_to_camera(sample.scene, lidar, cameras["02"])
         row = frame_facts(info, sample) | {
             "time_s": sensor_selection.stamp_s(sample, self.oxts),
             "cameras": {
@@ -191,13 +200,13 @@ class KittiRaw(base.ExporterBase):
             },
             "scan": None,
             "oxts": oxts_row(rig_motion(sample.scene, truly), self.origin_deg),
-            "boxes": tracklets.frame_boxes(sample, cameras["02"], lidar),
+            "boxes": tracklets.frame_boxes(sample, cameras["02"], lidar, turn),
             "calibration": calibration_texts(sample, cameras, lidar, unit),
         }
         if sensor_selection.has_scans(shard_dir, lidar, sample.index):
             points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
             path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
-            write_bytes(path, point_cloud_io.xyzi_bytes(points))
+            write_bytes(path, velodyne.scan_bytes(points, turn))
             row["scan"] = sweep_times_s(points, sensor_selection.stamp_s(sample, lidar))
         return row
 
@@ -250,7 +259,8 @@ def calibration_texts(
     """Texts of the three calibration files of a date, by name."""
     scene = sample.scene
     reference = camera_mount(scene, cameras.get("00", cameras["02"]))
-    scanner = lidar_mount(scene, lidar)
+    turn = velodyne.turn_to_camera(scene, lidar, cameras["02"])
+    scanner = velodyne.turned_mount(scene, lidar, turn)
     return {
         "calib_cam_to_cam.txt": cameras_text(scene, cameras, reference, "kitti_raw"),
         "calib_velo_to_cam.txt": _rigid_text(relative_pose(scene, reference, scanner))

@@ -13,7 +13,7 @@ missing, another sequence starts, numbered behind all views. Labels have 17 colu
 separated by blanks: ``frame track_id type truncated occluded alpha left top right bottom h w l x y
 z rotation_y``. They equal the rows of the exporter ``kitti``, but ``track_id`` is the instance id
 (-1 for DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as in KITTI's
-evaluation code.
+evaluation code. X of the points is ahead of camera 02 (``gen_data.exporters.velodyne``).
 
 Reference: Geiger et al., "Are we ready for Autonomous Driving?", CVPR 2012, and the readme of the
 tracking development kit; TrackEval reads the folder ``training`` as it is.
@@ -30,11 +30,11 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Scene
-from gen_data.exporters import base, image_files, kitti, sequences
+from gen_data.exporters import base, image_files, kitti, sequences, velodyne
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.kitti_raw import Latitude, Longitude, projection
 from gen_data.exporters.oxts import navigation_mount, oxts_row, rig_motion
-from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
+from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.sensor_selection import (
     check_calibrations,
     has_scans,
@@ -105,8 +105,10 @@ class KittiTracking(base.ExporterBase):
                 continue
             rows.append(self._row(info, sample))
             if has_scans(shard_dir, lidar, sample.index):
+                points = read_points(shard_dir, lidar, sample.index)
+                turn = velodyne.turn_to_camera(sample.scene, lidar, camera)
                 path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
-                sequences.write_bytes(path, xyzi_bytes(read_points(shard_dir, lidar, sample.index)))
+                sequences.write_bytes(path, velodyne.scan_bytes(points, turn))
         sequences.write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -186,7 +188,10 @@ def calib_text(scene: Scene, cameras: Mapping[str, str], lidar: str, unit: seque
     Without a laser scanner, the camera's frame takes the place of the scanner's.
     """
     reference = sequences.camera_mount(scene, cameras["02"])
-    scanner = sequences.lidar_mount(scene, lidar) if lidar else reference
+    scanner = reference
+    if lidar:
+        turn = velodyne.turn_to_camera(scene, lidar, cameras["02"])
+        scanner = velodyne.turned_mount(scene, lidar, turn)
     T_camera_velo = sequences.relative_pose(scene, reference, scanner).matrix()[:3]
     T_velo_imu = sequences.relative_pose(scene, scanner, unit).matrix()[:3]
     lines = []

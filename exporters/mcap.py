@@ -13,8 +13,9 @@ topic                           message (Protobuf schema ``foxglove.*``)
 /camera/<name>/calibration      CameraCalibration; none for equirectangular lenses
 /camera/<name>/annotations      ImageAnnotations: boxes of the visible pixels, with categories
 /lidar/<name>/points            PointCloud with all fields of ``POINT``
-/objects                        SceneUpdate: a cube per annotated object, frame ``world``, with
-                                category, name and instance id as metadata
+/objects                        SceneUpdate: a cube per object that a camera sees, at the instant of
+                                the step; frame ``world``, with category, name and instance id as
+                                metadata
 ==============================  =================================================================
 
 Every sequence starts at 0:00 UTC of 1 January 2020. Log times, publish times and times in messages
@@ -203,17 +204,20 @@ def _lidar_transforms(lidar: Lidar, time_s: float) -> list[tuple[float, str, str
 
 
 def world_boxes(sample: Sample) -> list[tuple[Instance, OrientedBox]]:
-    """World boxes of the objects that any camera sees; of all annotated ones without a camera."""
-    if sample.truth:
-        boxes = {
-            thing.instance.instance_id: (thing.instance, thing.box3d_world)
-            for truth in sample.truth.values()
-            for thing in truth.objects
-            if thing.box is not None and not thing.ignored
-        }
-        return [(i, box) for _, (i, box) in sorted(boxes.items()) if box is not None]
+    """World boxes of the objects that any camera sees; of all annotated ones without a camera.
+
+    They are at the sample's instant: cameras that read later have boxes of objects that moved on.
+    """
     things = sorted(sample.scene.instances, key=lambda thing: thing.instance_id)
-    return [(thing, thing.box3d) for thing in things if thing.annotated]
+    if not sample.truth:
+        return [(thing, thing.box3d) for thing in things if thing.annotated]
+    seen = {
+        thing.instance.instance_id: thing.instance
+        for truth in sample.truth.values()
+        for thing in truth.objects
+        if thing.box is not None and not thing.ignored
+    }
+    return [(seen[i.instance_id], i.box3d) for i in things if i.instance_id in seen]
 
 
 def _camera_row(truth: ImageTruth, time_s: float) -> dict[str, Any]:

@@ -63,20 +63,15 @@ def count_times_from(base: PointTime, points: NDArray[np.void], sweep_s: float) 
     return moved
 
 
-def xyzi_bytes(points: NDArray[np.void]) -> bytes:
-    """Encode points as KITTI's ``.bin``: little-endian float32 x, y, z, intensity per point."""
-    return np.column_stack([points["position_m"], points["intensity"]]).astype("<f4").tobytes()
-
-
 def T_camera_lidar(  # noqa: N802
     sample: Sample, camera: str, lidar: str, *, true: bool = False
-) -> se3.Array:
-    """Transform from lidar to camera coordinates, 4 x 4, as calibrations state it, or the true one.
+) -> se3.SE3:
+    """Transform from lidar to camera coordinates, as calibrations state it, or the true one.
 
     On a common rig it is the rig's calibration, at whatever instants the two read.
     """
     view, scanner = sample.truth[camera].camera, scanner_at_sweep(sample, lidar)
     view, scanner = (view, scanner) if true else (reported(view), reported(scanner))
     if view.rig and view.rig == scanner.rig:
-        return (view.T_rig_camera.inverse() @ scanner.T_rig_lidar).matrix()
-    return (view.T_world_camera.inverse() @ scanner.T_world_lidar).matrix()
+        return view.T_rig_camera.inverse() @ scanner.T_rig_lidar
+    return view.T_world_camera.inverse() @ scanner.T_world_lidar

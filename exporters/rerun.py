@@ -42,6 +42,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.core import capture, se3
+from gen_data.core.boxes import OrientedBox
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.serialization import canonical_json
@@ -126,13 +127,15 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         for item in truth.objects
         if item.box3d_world is not None and not item.ignored
     }
+    # At the sample's instant: cameras that read later have boxes of objects that moved on.
+    boxes = {thing.instance_id: thing.box3d for thing in sample.scene.instances}
     faults = {name: canonical_json(found) for name, found in sample.capture.faults() if found}
     return {
         "index": sample.index,
         "split": sample.split,
         **({"faults": faults} if faults else {}),
         "time_s": round(begins_s + sample.scene.time_s, 9),
-        "boxes": [_box_row(seen[number]) for number in sorted(seen)],
+        "boxes": [_box_row(seen[number], boxes[number]) for number in sorted(seen)],
         "rigs": {rig.name: _pose(sample.scene.rig_pose(rig.name)) for rig in sample.scene.rigs},
         "cameras": {
             name: {
@@ -165,12 +168,11 @@ def _delivery_row(
     return {} if found is None else {"delivery": found}
 
 
-def _box_row(item: ObjectTruth) -> dict[str, Any]:
-    assert item.box3d_world is not None, "chosen before"
+def _box_row(item: ObjectTruth, box: OrientedBox) -> dict[str, Any]:
     return {
         "class": item.instance.category_id,
-        "pose": _pose(item.box3d_world.T_frame_box),
-        "half": [0.5 * size for size in item.box3d_world.size_m],
+        "pose": _pose(box.T_frame_box),
+        "half": [0.5 * size for size in box.size_m],
     }
 
 

@@ -9,7 +9,8 @@
     sequences/00/times.txt             seconds
     split.yaml                         sequences of each split, as semantic-kitti.yaml lists them
 
-Scans are numbered without gaps in the order of samples; ``scans.txt`` names their samples.
+Scans are numbered without gaps in the order of samples; ``scans.txt`` names their samples. X of the
+points is the X axis of the rig, ahead (``gen_data.exporters.velodyne``).
 
 * **Views of several instants** are one sequence each, numbered by view. Instance ids are
   the scene's. Objects that move at the instant of a scan have a moving class.
@@ -38,13 +39,12 @@ from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import SE3
 from gen_data.core.serialization import from_plain
-from gen_data.exporters import base, image_files, kitti, point_cloud_io, sensor_selection
+from gen_data.exporters import base, image_files, kitti, point_cloud_io, sensor_selection, velodyne
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.sequences import (
     Frame,
     camera_mount,
     frame_facts,
-    lidar_mount,
     matrix_numbers,
     mounted_pose,
     read_sequences,
@@ -154,7 +154,8 @@ class SemanticKitti(base.ExporterBase):
                 continue
             points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
             stem = folder / f"{sample.index:09d}"
-            write_bytes(stem.with_suffix(".bin"), point_cloud_io.xyzi_bytes(points))
+            turn = velodyne.turn_to_rig(sample.scene, lidar)
+            write_bytes(stem.with_suffix(".bin"), velodyne.scan_bytes(points, turn))
             write_bytes(stem.with_suffix(".label"), point_labels(points, sample.scene).tobytes())
             eye = camera_mount(sample.scene, camera, true=True)
             row = {
@@ -205,8 +206,9 @@ def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
 
 
 def _calib(scene: Scene, camera: str, lidar: str) -> str:
-    T_camera_lidar = relative_pose(scene, camera_mount(scene, camera), lidar_mount(scene, lidar))
-    calib = kitti.calib_matrices(scene.camera(camera).intrinsics, T_camera_lidar.matrix()[:3])
+    scanner = velodyne.turned_mount(scene, lidar, velodyne.turn_to_rig(scene, lidar))
+    T_camera_velo = relative_pose(scene, camera_mount(scene, camera), scanner)
+    calib = kitti.calib_matrices(scene.camera(camera).intrinsics, T_camera_velo.matrix()[:3])
     projections = {k: calib[k] for k in ("P0", "P1", "P2", "P3")}
     return kitti.matrix_lines(projections | {"Tr": calib["Tr_velo_to_cam"]})
 

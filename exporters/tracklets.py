@@ -1,9 +1,9 @@
 """``tracklet_labels.xml``: the 3D boxes of a recording of KITTI's raw data, object by object.
 
 A tracklet spans the first to the last frame in which its object is visible; boxes of hidden frames
-in between are included. Poses are in the frame of the laser scanner: the centre of the bottom face,
-and the rotation about Z. A tracklet has one size, the largest of its object (people swing their
-arms).
+in between are included. Poses are in the frame of the scans (``gen_data.exporters.velodyne``): the
+centre of the bottom face, and the rotation about Z. A tracklet has one size, the largest of its
+object (people swing their arms).
 
 Reference: element names and states follow KITTI's raw data development kit (``tracklets.h``), which
 reads the file with Boost.Serialization.
@@ -17,7 +17,8 @@ import numpy as np
 
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.exporters import kitti, pointclouds
+from gen_data.core.se3 import IDENTITY
+from gen_data.exporters import kitti, pointclouds, velodyne
 
 INTERPOLATED, LABELLED = 1, 2
 """States of a box: not visible in this frame; visible."""
@@ -37,17 +38,27 @@ _UNKNOWN = "".join(
 )
 
 
-def frame_boxes(sample: Sample, camera: str, lidar: str) -> list[dict[str, Any]]:
-    """Boxes of all annotated objects of one frame, by instance id, as JSON values."""
+def frame_boxes(
+    sample: Sample, camera: str, lidar: str, turn: velodyne.Turn
+) -> list[dict[str, Any]]:
+    """Boxes of all annotated objects of one frame, by instance id, as JSON values.
+
+    Args:
+        sample: The frame.
+        camera: Camera 02.
+        lidar: Laser scanner.
+        turn: Turn of its frame to the frame of its files.
+    """
     truth = sample.truth[camera]
     seen = {thing.instance.instance_id: thing for thing in truth.objects}
     T_camera_lidar = truth.camera.T_world_camera.inverse() @ sample.scene.lidar(lidar).T_world_lidar
+    T_velo_lidar = velodyne.turned_pose(IDENTITY, turn).inverse()
     return [
         {
             "id": instance.instance_id,
             "type": kitti.official_type(instance),
             "size_m": [round(v, 6) for v in box.size_m],
-            "pose": _pose(box),
+            "pose": _pose(box.seen_from(T_velo_lidar)),
             **_visibility(seen.get(instance.instance_id), box.seen_from(T_camera_lidar), truth),
         }
         for instance, box in pointclouds.lidar_boxes(sample, lidar)

@@ -52,7 +52,7 @@ class Usd(base.AssetExporter):
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i + 0.5",
         lens="any; `genData:lens:*`",
-        time="time code = step; s between steps in `stages.jsonl`",
+        time="time code = step; `timeCodesPerSecond` of the stage",
     )
 
     image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT

@@ -409,9 +409,10 @@ def mesh_3d(mesh: asset_types.MeshData, slot_colors: NDArray[np.uint8]) -> rr.Me
 
 
 def boxes_3d(sample: Sample) -> rr.Boxes3D:
-    """World boxes of all objects visible to any camera, by instance id."""
+    """World boxes, at the sample's instant, of all objects visible to any camera, by id."""
+    boxes_then = {thing.instance_id: thing.box3d for thing in sample.scene.instances}
     found: dict[int, tuple[Instance, OrientedBox]] = {
-        item.instance.instance_id: (item.instance, item.box3d_world)
+        item.instance.instance_id: (item.instance, boxes_then[item.instance.instance_id])
         for truth in sample.truth.values()
         for item in truth.objects
         if item.box3d_world is not None

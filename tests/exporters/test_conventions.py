@@ -12,8 +12,8 @@ from gen_data.core.capture import POINT
 from gen_data.exporters import TABLE
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.nuscenes_files import lidar_bytes
-from gen_data.exporters.point_cloud_io import xyzi_bytes
 from gen_data.exporters.pointclouds import file_points
+from gen_data.exporters.velodyne import scan_bytes
 
 
 def test_every_exporter_states_its_conventions_and_the_page_has_their_table() -> None:
@@ -32,7 +32,7 @@ def test_laser_points_have_the_stated_intensities_and_rings() -> None:
     points = np.zeros(2, POINT)
     points["intensity"] = [0.0, 1.0]
     written = {"nuscenes": np.frombuffer(lidar_bytes(points, 0), "<f4").reshape(-1, 5)[:, 3],
-               "kitti": np.frombuffer(xyzi_bytes(points), "<f4").reshape(-1, 4)[:, 3],
+               "kitti": np.frombuffer(scan_bytes(points), "<f4").reshape(-1, 4)[:, 3],
                "pointclouds": file_points(points)["intensity"]}  # fmt: skip
     for name, intensity in written.items():
         low, high = TABLE.load(name).conventions.intensity.split(" to ")
