@@ -158,7 +158,7 @@ def _strip_meshes(spec: Any, mujoco: Any) -> dict[str, _File]:
 
 
 def _is_fitted(geom: Any, mujoco: Any) -> bool:
-    """Whether the size and place of a primitive are those of a mesh."""
+    """Whether the size and place of a primitive follow from a mesh."""
     kinds = mujoco.mjtGeom
     return bool(geom.meshname) and geom.type not in (kinds.mjGEOM_MESH, kinds.mjGEOM_SDF)
 

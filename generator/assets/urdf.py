@@ -142,7 +142,7 @@ def _named_looks(
 
 
 def _clamped_colors(root: Element) -> Iterator[str]:
-    """Remarks on colours beyond [0, 1], such as those that count to 255."""
+    """Remarks on colours beyond [0, 1], such as numbers up to 255."""
     for color in root.iter("color"):
         values = _parse_numbers(color.get("rgba", "0 0 0 0"), 4)
         if not all(0.0 <= value <= 1.0 for value in values):
