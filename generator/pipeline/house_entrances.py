@@ -83,12 +83,21 @@ class Ways:
 
     def beyond_m(self, places_m: Array) -> Array:
         """Distances [n] of places [n, 2] from the nearest edge of the lanes; 0 on them."""
+        nearest: Array = self._distances_m(places_m).min(axis=1, initial=np.inf)
+        return np.maximum(nearest, 0.0)
+
+    def near(self, place_m: Array, radius_m: float) -> "Ways":
+        """The pieces that come nearer than a radius to a place [2]."""
+        is_near = self._distances_m(place_m[None])[0] < radius_m
+        return Ways(self.start_m[is_near], self.step_m[is_near], self.half_m[is_near])
+
+    def _distances_m(self, places_m: Array) -> Array:
+        """Distances of places [n, 2] from the edges of all pieces, below 0 on them."""
         away = self.start_m - places_m[:, None]
         share = -(away * self.step_m).sum(axis=2) / (self.step_m * self.step_m).sum(axis=1)
         off = away + np.clip(share, 0.0, 1.0)[..., None] * self.step_m
-        distance: Array = np.hypot(off[..., 0], off[..., 1]) - self.half_m
-        nearest: Array = distance.min(axis=1, initial=np.inf)
-        return np.maximum(nearest, 0.0)
+        distances: Array = np.hypot(off[..., 0], off[..., 1]) - self.half_m
+        return distances
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -203,7 +212,10 @@ class _Site:
         flat = places_m.reshape(-1, 2)
         world = self.T_world_door.apply(np.column_stack([flat, np.zeros(len(flat), np.float64)]))
         top_m = self.house.T_world_body.translation_m[2]
-        behind = np.minimum(self.land.gardens.beyond_m(world[:, :2]) / APRON_M, 1.0)
+        middle = world[:, :2].mean(axis=0)
+        reach_m = float(np.hypot(*(world[:, :2] - middle).T).max())
+        gardens = self.land.gardens.near(middle, reach_m + APRON_M)
+        behind = np.minimum(gardens.beyond_m(world[:, :2]) / APRON_M, 1.0)
         level_m = top_m - behind * (top_m + APRON_FALL_M)
         over = self.land.relief.height(world) + level_m - self.T_world_door.translation_m[2]
         heights: Array = over.reshape(places_m.shape[:-1])
