@@ -102,7 +102,7 @@ class SurfaceRandomizer(RandomizerBase):
         wanted = set(self.targets) or groups
         for body in scene.bodies:
             named = body.group in wanted or body.name.partition("/")[0] in wanted
-            if named and not (self.exclude and assets.get(body.asset).words & set(self.exclude)):
+            if named and not any(assets.get(body.asset).has_word(w) for w in self.exclude):
                 yield body
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:

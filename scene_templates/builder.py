@@ -30,11 +30,12 @@ def build_scene(name: str, elements: Sequence[Element], assets: AssetIndex) -> S
         AssetError: an asset is unknown or unsuitable.
     """
     _check_names(elements)
-    absent = [e for e in elements if isinstance(e, TemplateElement) and not e.present]
-    _check_relations(elements, {element.name for element in absent})
+    absent = {e.name: e for e in elements if isinstance(e, TemplateElement) and not e.present}
+    _check_relations(elements, absent)
     scene = Scene(template=name)
     for element in sorted(elements, key=lambda element: element.follows_others):
-        scene = element.leave_out(scene) if element in absent else element.add(scene, assets)
+        left_out = absent.get(element.name)
+        scene = element.add(scene, assets) if left_out is None else left_out.leave_out(scene)
     if not scene.lights and not plates.has_plate(scene):
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
     if scene.lanes:

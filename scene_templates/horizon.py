@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -10,10 +11,10 @@ from pydantic import Field
 from gen_data.assets.families import declared
 from gen_data.config.base_model import NAME_PATTERN
 from gen_data.core import errors, interfaces
-from gen_data.core.scene import Lane, Scene
+from gen_data.core.scene import Body, Lane, Scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.core.variant_rng import VariantRng, variant_rng
-from gen_data.scene_templates.element import Element, add_background, parametric_id
+from gen_data.scene_templates.element import Element, parametric_id
 
 HorizonKind = Literal["trees", "forest", "town", "skyline", "hills"]
 Season = Literal["spring", "summer", "autumn", "winter"]
@@ -75,6 +76,7 @@ class Horizon(Element):
         hull = convex_outline(_lane_points(scene.lanes))
         for kind in dict.fromkeys(self.kinds):
             rng = variant_rng(f"horizon/{kind}", self.seed)
+            bodies = []
             for number, place in enumerate(self._places(hull, kind, rng)):
                 parameters: dict[str, str | int] = {"seed": int(rng.random() * _VARIANTS[kind])}
                 if kind not in ("town", "skyline") and self.season != "summer":
@@ -82,7 +84,8 @@ class Horizon(Element):
                 asset = parametric_id(f"horizon/{kind}", **parameters)
                 front = assets.bounds_m(asset)[1][0]
                 pose = place @ SE3((-front, 0.0, -_SUNK_M[kind]))
-                scene = add_background(scene, assets, f"{self.name}/{kind}/{number}", asset, pose)
+                bodies.append(Body(f"{self.name}/{kind}/{number}", asset, pose.rounded()))
+            scene = replace(scene, bodies=(*scene.bodies, *bodies))
         return scene
 
     def _places(self, hull_m: Array, kind: HorizonKind, rng: VariantRng) -> list[SE3]:
@@ -95,29 +98,32 @@ class Horizon(Element):
         count = max(3, math.ceil(perimeter / (0.94 * piece_m)))
         start = np.concatenate([[0.0], np.cumsum(steps)])
         closed = np.concatenate([outline, outline[:1]])
-        centre = 0.5 * (hull_m.min(axis=0) + hull_m.max(axis=0))
-        made = []
+        centre = (0.5 * (hull_m.min(axis=0) + hull_m.max(axis=0))).tolist()
+        drawn = []
         for k in range(count):
             at = perimeter * (k + rng.between(-0.06, 0.06) + 0.5) / count
             kept = rng.chance(self.coverage) or kind in ("hills", "town", "skyline")
             back = rng.between(0.0, 0.12) * far_m
-            turn = rng.between(-0.08, 0.08)
-            before, here, after = (
-                np.array([np.interp(a, start, closed[:, i]) for i in (0, 1)])
-                for a in (max(at - 4.0, 0.0), at, min(at + 4.0, perimeter))
-            )
+            drawn.append((at, back, rng.between(-0.08, 0.08), kept))
+        at_m = np.array([at for at, _, _, _ in drawn])
+        before, here, after = (
+            [np.interp(a, start, closed[:, i]).tolist() for i in (0, 1)]
+            for a in (np.maximum(at_m - 4.0, 0.0), at_m, np.minimum(at_m + 4.0, perimeter))
+        )
+        made = []
+        for k, (_, back, turn, kept) in enumerate(drawn):
             # The outline runs counter-clockwise: outside is on its right.
-            yaw = math.atan2(*(after - before)[::-1]) + 0.5 * math.pi
-            place = here - back * np.array([math.cos(yaw), math.sin(yaw)])
-            if kept and self._is_in_arc(place - centre):
-                made.append(SE3.about_z(yaw + turn, (float(place[0]), float(place[1]), 0.0)))
+            yaw = math.atan2(after[1][k] - before[1][k], after[0][k] - before[0][k]) + 0.5 * math.pi
+            x, y = here[0][k] - back * math.cos(yaw), here[1][k] - back * math.sin(yaw)
+            if kept and self._is_in_arc(x - centre[0], y - centre[1]):
+                made.append(SE3.about_z(yaw + turn, (x, y, 0.0)))
         return made
 
-    def _is_in_arc(self, offset_m: Array) -> bool:
+    def _is_in_arc(self, x_m: float, y_m: float) -> bool:
         """Whether the direction of a place from the middle of the roads is to be filled."""
         if not self.arcs_deg:
             return True
-        bearing = math.degrees(math.atan2(float(offset_m[1]), float(offset_m[0])))
+        bearing = math.degrees(math.atan2(y_m, x_m))
         return any((bearing - low) % 360.0 <= (high - low) for low, high in self.arcs_deg)
 
 
@@ -154,15 +160,15 @@ def _near_hull(points_m: Array) -> Array:
 def _half_hull(ordered: Sequence[Sequence[float]]) -> list[Sequence[float]]:
     chain: list[Sequence[float]] = []
     for p in ordered:
-        while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0.0:
+        x, y = p
+        while len(chain) > 1:
+            (ax, ay), (bx, by) = chain[-2], chain[-1]
+            # Twice the signed area of a triangle: positive for a turn to the left.
+            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                break
             chain.pop()
         chain.append(p)
     return chain
-
-
-def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
-    """Twice the signed area of a triangle; positive for a turn to the left."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def offset_outline(hull_m: Array, distance_m: float) -> Array:

@@ -37,8 +37,8 @@ class LaneObjects(element.Element):
 
     def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the group, and its objects evenly along the lanes."""
-        lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
-        if not lines and self.count:
+        own = [lane for lane in scene.lanes if lane.kind in self.lanes]
+        if not own and self.count:
             known = ", ".join(sorted({lane.kind for lane in scene.lanes})) or "none"
             raise errors.ConfigError(
                 f"elements.{self.name}.lanes: there is no lane of kind {' or '.join(self.lanes)}; "
@@ -55,6 +55,9 @@ class LaneObjects(element.Element):
             facing=self.facing,
         )
         scene = replace(scene, groups=(*scene.groups, group))
+        if not self.count:
+            return scene
+        lines = [LaneLine(lane) for lane in own]
         total_m = sum(line.length_m for line in lines)
         members = []
         for number in range(self.count):

@@ -80,7 +80,7 @@ class AssetChoice(Strict):
             members = assets.variants(asset_id) or (assets.get(asset_id),)
             found |= {a.asset_id: a for a in members}
         check_words(self.exclude, found.values(), assets, f"{field}.exclude")
-        fitting = [asset for asset in found.values() if not asset.words & set(self.exclude)]
+        fitting = [a for a in found.values() if not any(map(a.has_word, self.exclude))]
         return tuple(sorted(asset.asset_id for asset in self._select_preferred(fitting)))
 
     def _select_preferred(self, fitting: list[Asset]) -> Iterator[Asset]:

@@ -112,10 +112,13 @@ def _pieces(lane: Lane, place: RoadPlace, half_m: float) -> Iterator[Lane]:
     ends = ((0.0, low * line.length_m), (high * line.length_m, line.length_m))
     for number, (start, end) in enumerate(ends):
         if end - start >= _SHORTEST_M:
-            inside = [a for a in line.at_m if start + 0.05 < a < end - 0.05]
-            center: tuple[Vec3, ...] = tuple(
-                line.pose(a).rounded().translation_m for a in (start, *inside, end)
-            )
+            first, last = (line.pose(a).rounded().translation_m for a in (start, end))
+            inside = [
+                point
+                for a, point in zip(line.at_m, lane.center_m, strict=True)
+                if start + 0.05 < a < end - 0.05
+            ]
+            center: tuple[Vec3, ...] = (first, *inside, last)
             name = lane.name if number == 0 else f"{lane.name}_on"
             onward = lane.successors if number == 1 else ()
             yield replace(lane, name=name, center_m=center, successors=onward)

@@ -87,9 +87,17 @@ class PipelineFactory:
             ConfigError: a randomizer refers to something that neither they nor the assets have.
         """
         config, library = self.config, self.library
-        scenes = tuple(nominal_scene(config, scene, library) for scene in config.probes)
+        built: dict[tuple[int, ...], Scene] = {}
+        scenes = []
+        for probe in config.probes:
+            # A probe shares its elements with others, as the same objects: many shared values, such
+            # as the weather, concern randomizers only.
+            key = tuple(map(id, probe.elements))
+            if key not in built:
+                built[key] = _build(config, probe, library)
+            scenes.append(_mounted(config, probe, built[key], library))
         _check_references(config, scenes, library)
-        return scenes
+        return tuple(scenes)
 
     def check(self) -> None:
         """Refuse a configuration that cannot give samples or exports, before any engine starts.
@@ -326,17 +334,28 @@ def nominal_scene(
     Raises:
         ConfigError: an element or a sensor does not fit into it.
     """
+    return _mounted(config, scene_config, _build(config, scene_config, assets), assets)
+
+
+def _build(config: Config, scene_config: SceneConfig, assets: interfaces.AssetIndex) -> Scene:
+    """The scene of the template, which depends on the elements alone."""
     template = config.general.template or config.name
     try:
         with located_errors(config.document):
-            scene = build_scene(template, scene_config.elements, assets)
+            return build_scene(template, scene_config.elements, assets)
     except AssetError as error:
         place = find_text(config.document, error.asset_id) if error.asset_id else None
         if place is None:
             raise
         raise type(error)(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
+
+
+def _mounted(
+    config: Config, scene_config: SceneConfig, built: Scene, assets: interfaces.AssetIndex
+) -> Scene:
+    """The scene with all sensors, shared values and settings of the data set."""
     scene = replace(
-        scene,
+        built,
         shared=scene_config.shared,
         step_s=config.general.step_s,
         box3d=config.general.labels.box3d,
@@ -386,13 +405,8 @@ def _check_on_plate(sensor: interfaces.Sensor) -> None:
 def collect_categories(scenes: Sequence[Scene], assets: interfaces.AssetIndex) -> tuple[str, ...]:
     """Sorted names of all categories that a sample may contain."""
     placed = {i.category for scene in scenes for i in scene.instances if i.annotated}
-    possible = {
-        assets.get(asset_id).category
-        for scene in scenes
-        for group in scene.groups
-        if group.annotated
-        for asset_id in group.assets
-    }
+    groups = [g.assets for scene in scenes for g in scene.groups if g.annotated]
+    possible = {assets.get(asset_id).category for asset_id in frozenset[str]().union(*groups)}
     for category in sorted(placed | possible):
         try:
             path_names.check_name(category, path_names.CATEGORY_MAX)

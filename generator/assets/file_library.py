@@ -5,7 +5,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,15 @@ from gen_data.assets.sandbox import run_sandboxed
 from gen_data.assets.texture_maps import compose_texture, find_maps
 from gen_data.assets.usd_stages import is_stage
 from gen_data.core import plates, scene
-from gen_data.core.asset_types import Asset, Float32, RobotModel, Symmetry, TextureData, UInt8
+from gen_data.core.asset_types import (
+    Asset,
+    AssetFacts,
+    Float32,
+    RobotModel,
+    Symmetry,
+    TextureData,
+    UInt8,
+)
 from gen_data.core.errors import AssetError
 
 PYBULLET = "pybullet"
@@ -389,9 +397,7 @@ class FileLibrary:
             sha256=self._key(one),
             mass_kg=mesh.mass_kg,
             stackable=mesh.stackable,
-            subcategory=mesh.subcategory,
-            attributes=tuple(sorted(mesh.attributes.items())),
-            symmetries=_convert_symmetries(mesh),
+            facts=partial(_read_facts, mesh),
         )
 
     def _key(self, one: IndexedAsset) -> str:
@@ -427,6 +433,11 @@ class FileLibrary:
 def describe_unused(unused: tuple[tuple[str, int], ...]) -> str:
     """Elements of a road network without effect, in words."""
     return "not used: " + ", ".join(f"{count} {name}" for name, count in unused)
+
+
+def _read_facts(mesh: MeshEntry) -> AssetFacts:
+    attributes = tuple(sorted(mesh.attributes.items()))
+    return AssetFacts(mesh.subcategory, attributes, _convert_symmetries(mesh))
 
 
 def _convert_symmetries(entry: MeshEntry) -> tuple[Symmetry, ...]:

@@ -1,8 +1,8 @@
 """Procedural assets: families of objects, textures and environments."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 from gen_data.assets import asset_arrays, asset_cache, drape, family_parameters, importer
@@ -10,7 +10,7 @@ from gen_data.assets.asset_ids import AssetId, ParameterValue, format_parameter
 from gen_data.assets.families import AnyFamily, kind_of, own_families, third_party_families
 from gen_data.assets.family import EnvironmentFamily, Facts, Family, TextureFamily
 from gen_data.core import activity
-from gen_data.core.asset_types import Asset, Float32, Symmetry, TextureData
+from gen_data.core.asset_types import Asset, AssetFacts, Float32, Symmetry, TextureData
 from gen_data.core.bounded_cache import CountCache, Sized
 from gen_data.core.errors import AssetError, did_you_mean
 from gen_data.core.variant_rng import Draw, drawing
@@ -92,7 +92,9 @@ class ProceduralLibrary:
         if _merge_arguments(asset_id, family)[1]:
             # Possible values depend on other draws: only making the asset finds wrong ones.
             _MAKE[kind_of(family)](self, asset_id)
-        facts = _read_facts(asset_id, family)
+        facts = _Facts(asset_id, family)
+        if not _is_offered(asset_id, family):
+            facts()  # Finds values that are impossible.
         origin = family.origin
         return Asset(
             asset_id=str(asset_id),
@@ -105,9 +107,7 @@ class ProceduralLibrary:
             sha256=self._key(asset_id, family),
             mass_kg=family.mass_kg if isinstance(family, Family) else 0.0,
             stackable=isinstance(family, Family) and family.stackable,
-            subcategory=facts.subcategory,
-            attributes=tuple(sorted(facts.attributes.items())),
-            symmetries=_list_symmetries(asset_id, family),
+            facts=facts,
         )
 
     def imported(self, asset_id: AssetId) -> importer.ImportedMesh:
@@ -232,6 +232,26 @@ def _is_offered(asset_id: AssetId, family: AnyFamily) -> bool:
     """Whether an asset is one of the family's seeds that are offered for selection."""
     seed = asset_id.parameters.get("seed")
     return len(asset_id.parameters) == 1 and type(seed) is int and 0 <= seed < family.variants
+
+
+@dataclass(frozen=True)
+class _Facts:
+    """Facts about an asset, found when they are first asked for."""
+
+    asset_id: AssetId
+    family: AnyFamily
+
+    def __call__(self) -> AssetFacts:
+        """The facts."""
+        return self._found
+
+    @cached_property
+    def _found(self) -> AssetFacts:
+        facts = _read_facts(self.asset_id, self.family)
+        attributes = tuple(sorted(facts.attributes.items()))
+        return AssetFacts(
+            facts.subcategory, attributes, _list_symmetries(self.asset_id, self.family)
+        )
 
 
 def _read_facts(asset_id: AssetId, family: AnyFamily) -> Facts:

@@ -14,7 +14,7 @@ Global choices condition local ones, and these condition objects: structured dom
 (Prakash et al., ICRA 2019). The functions here rewrite documents, which are validated afterwards.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -137,10 +137,11 @@ def probe_values(section: Node, seed: int) -> Iterator[dict[str, SharedValue]]:
             own = {n: v for n, v in known.items() if not names_in(section.entries[n])}
             if any(v not in _possible(section.entries[n]) for n, v in own.items()):
                 continue
+            needed = _ancestors(section, name)
             for scene in range(_SEARCHED_SCENES):
-                shared = _evaluate(section, Streams(seed, scene, index=scene), own)
-                if shared[name] == outcome:
-                    yield record(shared)
+                streams = Streams(seed, scene, index=scene)
+                if _evaluate(section, streams, own, needed)[name] == outcome:
+                    yield record(_evaluate(section, streams, own))
                     break
 
 
@@ -164,13 +165,36 @@ def _selected_outcomes(
             yield from _selected_outcomes(item, {**selected, **value})
 
 
-def _evaluate(section: Node, streams: Streams, fixed: Shared) -> dict[str, SharedValue]:
-    """Evaluate all values in the order of their dependencies; ``fixed`` ones are not drawn."""
+def _ancestors(section: Node, name: str) -> frozenset[str]:
+    """The name of a value and of all values that it depends on, directly or through others."""
+    found: set[str] = set()
+    ahead = {name}
+    while ahead:
+        found |= ahead
+        ahead = {n for known in ahead for n in names_in(section.entries[known])}
+        ahead = (ahead & section.entries.keys()) - found
+    return frozenset(found)
+
+
+def _evaluate(
+    section: Node, streams: Streams, fixed: Shared, names: Container[str] | None = None
+) -> dict[str, SharedValue]:
+    """Evaluate all values in the order of their dependencies; ``fixed`` ones are not drawn.
+
+    Args:
+        section: Section ``shared``.
+        streams: Streams of the scene.
+        fixed: Given values.
+        names: The only values to evaluate, with all that they depend on; None = all. As each is
+            drawn from its own stream, they are the same.
+    """
     if not isinstance(section.content, Mapping):
         fact = "expected a mapping of names to values or distributions"
         refuse(section.position, "shared", fact)
     shared: dict[str, SharedValue] = {}
     for name in _ORDERS.get(section, lambda: _order(section)):
+        if names is not None and name not in names:
+            continue
         given = name in fixed
         shared[name] = fixed[name] if given else _draw(name, section.entries[name], shared, streams)
     return shared

@@ -21,7 +21,8 @@ def check_words(
     Raises:
         ConfigError: names the first unknown word, and the nearest known ones.
     """
-    left = set(words).difference(*(asset.words for asset in found))
+    objects = tuple(found)
+    left = {word for word in words if not any(asset.has_word(word) for asset in objects)}
     known = frozenset[str]().union(*(asset.words for asset in assets.find(()))) if left else ()
     for word in words:
         if word in left and word not in known:

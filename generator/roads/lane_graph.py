@@ -2,9 +2,8 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from gen_data.roads.cross_section import (
     side_index,
     strips,
 )
-from gen_data.roads.reference_line import Array, ReferenceLine
+from gen_data.roads.reference_line import Array, beside
 
 FURNITURE_M = 0.5
 """Distance of poles and bins from the kerb."""
@@ -40,6 +39,7 @@ def road_lanes(
 ) -> tuple[Lane, ...]:
     """Make the lanes of a road: driving lanes both ways, others with the road on their left."""
     line = shape.line()
+    poses = line.poses(stations(0.0, line.length_m, _STEP_M))
     lanes: list[Lane] = []
     for side in (1, -1):
         word = "left" if side > 0 else "right"
@@ -48,7 +48,7 @@ def road_lanes(
         forward = shape.forward(side)
         for strip in driving:
             left, right = _neighbours(name, shape, side, strip.number, len(driving))
-            center = path(line, strip.middle_m, strip.middle_z_m, forward, T_world_road)
+            center = _path(poses, strip.middle_m, strip.middle_z_m, forward, T_world_road)
             own = lane_name(name, side, strip.number, shape)
             rise = (strip.inner_z_m - strip.outer_z_m) / strip.width_m
             bank = round(rise if shape.traffic == "right" else -rise, 9) + 0.0
@@ -58,7 +58,7 @@ def road_lanes(
         for kind, t_m, z_m, width_m in _beside(row, side):
             if kind == "parking" and angled:
                 continue
-            center = path(line, t_m, z_m, side < 0, T_world_road)
+            center = _path(poses, t_m, z_m, side < 0, T_world_road)
             speed = BICYCLE_M_S if kind == "bicycle" else 0.0
             own = f"{name}/{kind}_{word}"
             lanes.append(Lane(own, kind, center, width_m, road=name, speed_m_s=speed))
@@ -67,7 +67,7 @@ def road_lanes(
     lanes += _turn_lanes(shape, name, T_world_road, speed_m_s)
     if shape.median_kerb_m > 0.0 and shape.median_m >= PLANTED_MEDIAN_M:
         z_m = strips(shape, 1)[0].inner_z_m
-        center = path(line, 0.0, z_m, True, T_world_road)
+        center = _path(poses, 0.0, z_m, True, T_world_road)
         width_m = shape.median_m - 2.0 * KERB_WIDTH_M
         lanes.append(Lane(f"{name}/verge_median", "verge", center, width_m, road=name))
     return tuple(lanes)
@@ -94,16 +94,16 @@ def _bays(
     """Make a lane per angled bay, from the street inwards and over the kerb by ``OVERHANG_M``."""
     line = shape.line()
     for strip in (strip for strip in row if strip.kind == "parking"):
-        borders = bay_borders(shape, strip)
-        for k, ((near, far), (after_near, after_far)) in enumerate(pairwise(borders)):
-            st = 0.5 * np.array(
-                [[near[0] + after_near[0], near[1] + after_near[1]],
-                 [far[0] + after_far[0], far[1] + after_far[1]]]
-            )  # fmt: skip
-            beyond = st[1] + (st[1] - st[0]) * (OVERHANG_M / math.hypot(*(st[1] - st[0])))
-            flat = line.points(np.array([st[0, 0], beyond[0]]), np.array([st[0, 1], beyond[1]]))
-            ends = np.column_stack([flat, np.full(2, strip.middle_z_m)])
-            center = world_points(ends, T_world_road)
+        borders = np.array(bay_borders(shape, strip))
+        middles = 0.5 * (borders[:-1] + borders[1:])
+        inwards = middles[:, 1] - middles[:, 0]
+        reach = OVERHANG_M / np.array([math.hypot(s, t) for s, t in inwards.tolist()])
+        ends = np.stack([middles[:, 0], middles[:, 1] + inwards * reach[:, None]], axis=1)
+        flat = line.points(ends[..., 0].ravel(), ends[..., 1].ravel())
+        solid = np.column_stack([flat, np.full(len(flat), strip.middle_z_m)])
+        points = world_points(solid, T_world_road)
+        for k in range(len(ends)):
+            center = points[2 * k : 2 * k + 2]
             yield Lane(f"{prefix}{k}", "parking", center, BAY_WIDTH_M, road=name)
 
 
@@ -112,14 +112,13 @@ def lane_name(road: str, side: int, number: int, shape: RoadShape) -> str:
     return f"{road}/{'forward' if shape.forward(side) else 'backward'}{number}"
 
 
-def path(
-    line: ReferenceLine, t_m: float, z_m: float, forward: bool, T_world_road: SE3
+def _path(
+    poses: Array, t_m: float, z_m: float, forward: bool, T_world_road: SE3
 ) -> tuple[Vec3, ...]:
-    """Points of a line parallel to a reference line, in the world."""
-    s = stations(0.0, line.length_m, _STEP_M)
-    s = s if forward else s[::-1]
-    flat = line.points(s, np.full(len(s), t_m))
-    return world_points(np.column_stack([flat, np.full(len(s), z_m)]), T_world_road)
+    """Points in the world at a distance to the left of a road's poses [n, 3], or back along it."""
+    along = poses if forward else poses[::-1]
+    flat = beside(along, np.full(len(along), t_m))
+    return world_points(np.column_stack([flat, np.full(len(along), z_m)]), T_world_road)
 
 
 def world_points(points: Array, T_world_road: SE3) -> tuple[Vec3, ...]:
@@ -135,47 +134,39 @@ def stations(start_m: float, end_m: float, step_m: float) -> Array:
 
 def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
     """Set the successors of lanes: lanes that start at a lane's end, in its direction."""
-    # By kind and cell: a hundred lanes have ten thousand pairs of ends and starts.
-    starts = defaultdict(list)
-    for lane in lanes:
-        start = lane.name, lane.center_m[0], _heading(lane.center_m, 0)
-        i, j = _cell(lane.center_m[0])
-        starts[lane.kind, i, j].append(start)
-    linked = ((lane, tuple(_find_successors(lane, starts))) for lane in lanes)
+    found: defaultdict[int, set[str]] = defaultdict(set)
+    for k, n in _near_pairs(lanes):
+        lane, other = lanes[k], lanes[n]
+        if lane.kind == other.kind and lane.name != other.name and _meet(lane, other):
+            found[k].add(other.name)
+    linked = [tuple(sorted(found[k] | set(lane.successors))) for k, lane in enumerate(lanes)]
     # A lane is measured once, as long as it is the same object.
     return tuple(
-        lane if lane.successors == found else replace(lane, successors=found)
-        for lane, found in linked
+        lane if lane.successors == names else replace(lane, successors=names)
+        for lane, names in zip(lanes, linked, strict=True)
     )
 
 
-_Starts = Mapping[tuple[LaneKind, int, int], Sequence[tuple[str, Vec3, float]]]
-"""Names, first points and directions of lanes by kind and cell of the first point."""
+def _near_pairs(lanes: Sequence[Lane]) -> list[list[int]]:
+    """Pairs of a lane and another that starts at most ``MEETING_M`` from its end along X and Y."""
+    ends, starts = (
+        np.array([lane.center_m[k][:2] for lane in lanes]).reshape(-1, 2) for k in (-1, 0)
+    )
+    away = np.abs(ends[:, None, :] - starts[None, :, :])
+    pairs: list[list[int]] = np.argwhere((away <= MEETING_M).all(axis=2)).tolist()
+    return pairs
 
 
-def _cell(place_m: Vec3) -> tuple[int, int]:
-    """The square metre of the world around a place."""
-    return math.floor(place_m[0]), math.floor(place_m[1])
+def _meet(lane: Lane, following: Lane) -> bool:
+    """Whether a lane starts at another one's end, in its direction."""
+    end, start = lane.center_m[-1], following.center_m[0]
+    turn = _heading(*following.center_m[:2]) - _heading(*lane.center_m[-2:])
+    is_straight = abs(math.remainder(turn, math.tau)) < MEETING_RAD
+    return math.dist(end, start) < MEETING_M and is_straight
 
 
-def _find_successors(lane: Lane, starts: _Starts) -> list[str]:
-    end, heading = lane.center_m[-1], _heading(lane.center_m, -2)
-    i, j = _cell(end)
-    found = {
-        name
-        for x in (i - 1, i, i + 1)
-        for y in (j - 1, j, j + 1)
-        for name, start, direction in starts.get((lane.kind, x, y), ())
-        if name != lane.name
-        and math.dist(end, start) < MEETING_M
-        and abs(math.remainder(direction - heading, math.tau)) < MEETING_RAD
-    }
-    return sorted(found | set(lane.successors))
-
-
-def _heading(points: Sequence[Vec3], k: int) -> float:
-    (x0, y0, _), (x1, y1, _) = points[k], points[k + 1] if k != -2 else points[-1]
-    return math.atan2(y1 - y0, x1 - x0)
+def _heading(start_m: Vec3, end_m: Vec3) -> float:
+    return math.atan2(end_m[1] - start_m[1], end_m[0] - start_m[0])
 
 
 def _neighbours(name: str, shape: RoadShape, side: int, number: int, count: int) -> tuple[str, str]:

@@ -161,8 +161,13 @@ class ReferenceLine:
 
     def points(self, s_m: Array, t_m: Array) -> Array:
         """Points [n, 2] at arc lengths and distances to the left."""
-        x, y, heading = self.poses(s_m).T
-        return np.stack([x - t_m * np.sin(heading), y + t_m * np.cos(heading)], axis=1)
+        return beside(self.poses(s_m), t_m)
+
+
+def beside(poses: Array, t_m: Array) -> Array:
+    """Points [n, 2] at distances [n] to the left of poses [n, 3]."""
+    x, y, heading = poses.T
+    return np.stack([x - t_m * np.sin(heading), y + t_m * np.cos(heading)], axis=1)
 
 
 def cubic(coefficients: Sequence[float], x: Array) -> Array:

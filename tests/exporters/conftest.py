@@ -480,8 +480,9 @@ class Props:
         middle = (0.0, 0.0, 0.5 * SIZES_M[category][2])
         turns = [asset_types.Symmetry((0.0, 0.0, 1.0), 2)] if category == "crate" else []
         turns += [asset_types.Symmetry((1.0, 0.0, 0.0), 2, middle)] if shape == "ellipsoid" else []
+        facts = asset_types.AssetFacts(symmetries=tuple(turns))
         nobody = ("CC0-1.0", "", "", "")
-        return asset_types.Asset(asset_id, "object", category, (), *nobody, symmetries=tuple(turns))
+        return asset_types.Asset(asset_id, "object", category, (), *nobody, facts=lambda: facts)
 
     def mesh(self, asset_id: str) -> asset_types.MeshData:
         import trimesh

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from gen_data.core.asset_types import Asset, Keypoint, MeshData
+from gen_data.core.asset_types import Asset, AssetFacts, Keypoint, MeshData
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected
 from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled, Stage
@@ -214,10 +214,8 @@ class TwoBoxes:
     """Assets of which every one is a box of 2 x 4 x 6 cm with a point at its top."""
 
     def get(self, asset_id: str) -> Asset:
-        return Asset(
-            asset_id, "object", "mug", (), "", "", "", "",
-            subcategory="small", attributes=(("lid", "open"), ("state", "new")),
-        )  # fmt: skip
+        facts = AssetFacts("small", (("lid", "open"), ("state", "new")))
+        return Asset(asset_id, "object", "mug", (), "", "", "", "", facts=lambda: facts)
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         return (Keypoint("top", (0.0, 0.0, 0.03)),)
