@@ -1,6 +1,7 @@
 """Import of UsdPreviewSurface networks."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,6 +11,20 @@ from gen_data.core import asset_types, se3
 from gen_data.core.errors import AssetError
 
 _IDENTITY = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """How the texels of an image become values: ``texel * scale + bias``.
+
+    Attributes:
+        scale, bias: By channel.
+        space: ``raw`` (linear), ``sRGB`` or ``auto``: colours are sRGB, other values linear.
+    """
+
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
+    bias: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    space: str = "auto"
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +44,7 @@ class BoundMaterial:
         uv_name: Primvar of its texture coordinates.
         uv_matrix: Affine map [2, 3] of the texture coordinates.
         color_name: Primvar that is its colour; empty = it has a colour.
+        transfers: Of the images whose values are not their texels times a factor, by attribute.
         unused: Unused contents of the material.
     """
 
@@ -46,6 +62,7 @@ class BoundMaterial:
     uv_name: str = "st"
     uv_matrix: se3.Array = field(default_factory=lambda: _IDENTITY)
     color_name: str = ""
+    transfers: Mapping[str, Transfer] = field(default_factory=dict)
     unused: tuple[str, ...] = ()
 
     @property
@@ -70,8 +87,11 @@ def read_bound_material(prim: Any, place: str) -> BoundMaterial:
     """
     from pxr import UsdShade
 
-    material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
-    if not material:
+    bindings, tokens = UsdShade.MaterialBindingAPI(prim), UsdShade.Tokens
+    # Either falls back to the binding for all purposes.
+    bound = (bindings.ComputeBoundMaterial(p)[0] for p in (tokens.preview, tokens.full))
+    material = next((found for found in bound if found), None)
+    if material is None:
         return PLAIN
     surface = material.ComputeSurfaceSource()[0]
     where = f"{place}: material {material.GetPath()}"
@@ -93,7 +113,7 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
         raise AssetError(f"{where}: ior is {ior:g}, expected at least 1; correct it")
     primvar = _color_primvar(surface)
     color, image = (
-        ((1.0, 1.0, 1.0), None)
+        (_primvar_fallback(surface), None)
         if primvar
         else _read_color(surface, "diffuseColor", (0.18, 0.18, 0.18), where)
     )
@@ -132,19 +152,34 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
         emission_image=_image_path(glow_image, where),
         cutoff=numbers["opacityThreshold"] if is_cutout else 0.5,
         color_name=primvar,
+        unused=tuple(
+            f"material '{name}': {key} is not used"
+            for key in ("specularColor", "displacement")
+            if _has_effect(surface, key)
+        ),
     )
     nodes = {"diffuseColor": image} | {key: _find_source(surface, key)[1] for key in _IMAGED}
     placed = {key: _read_coordinates(node) for key, node in nodes.items() if _is_image(node)}
     if not placed:
         return look
     uv_name, uv_matrix = next(iter(placed.values()))
-    unused = tuple(
+    given = ((key, _read_transfer(nodes[key], key)) for key in placed)
+    look = replace(look, transfers={key: found for key, found in given if found is not None})
+    unused = look.unused + tuple(
         f"material '{name}': the texture coordinates of {key} differ from the ones of "
         f"{next(iter(placed))} and are not used"
         for key, (other, matrix) in placed.items()
         if other != uv_name or not np.array_equal(matrix, uv_matrix)
     )
     return replace(look, uv_name=uv_name, uv_matrix=uv_matrix, unused=unused)
+
+
+def _has_effect(surface: Any, key: str) -> bool:
+    """Whether an input that is not used has an effect on other renderers."""
+    value, node = _find_source(surface, key)
+    if key == "specularColor" and not _find_source(surface, "useSpecularWorkflow")[0]:
+        return False
+    return node is not None or bool(np.any(value if value is not None else 0.0))
 
 
 _NUMBERS = {
@@ -182,14 +217,16 @@ def _read_number(
         return number if name == "ior" else _clamp_unit(number), ("", 0)
     output = str(surface.GetInput(name).GetValueProducingAttributes()[0].GetName())
     channel = max("rgba".find(UsdShade.Utils.GetBaseNameAndType(output)[0][:1]), 0)
-    return _read_scale(node)[channel], (_image_path(node, where), channel)
+    factor = 1.0 if _read_transfer(node, name) is not None else _read_scale(node)[channel]
+    return factor, (_image_path(node, where), channel)
 
 
 def _read_color(surface: Any, name: str, default: se3.Vec3, where: str) -> tuple[se3.Vec3, Any]:
     """Read a colour input and the node of the image that it multiplies; None = no image."""
     value, node = _find_source(surface, name)
     if _is_image(node):
-        return _read_scale(node)[:3], node
+        whole = _read_transfer(node, name) is not None
+        return (1.0, 1.0, 1.0) if whole else _read_scale(node)[:3], node
     if node is not None:
         raise AssetError(
             f"{where}: {name} comes from {node.GetIdAttr().Get()}, which is not supported; "
@@ -207,6 +244,16 @@ def _color_primvar(surface: Any) -> str:
     return str(_find_source(node, "varname")[0] or "displayColor")
 
 
+def _primvar_fallback(surface: Any) -> se3.Vec3:
+    """Colour of meshes that lack the primvar of the diffuse colour; white if none is stated."""
+    value = _find_source(_find_source(surface, "diffuseColor")[1], "fallback")[0]
+    try:
+        red, green, blue = (float(c) for c in value)
+    except (TypeError, ValueError):
+        return (1.0, 1.0, 1.0)
+    return (red, green, blue)
+
+
 def _is_image(node: Any) -> bool:
     return node is not None and node.GetIdAttr().Get() == "UsdUVTexture"
 
@@ -214,6 +261,24 @@ def _is_image(node: Any) -> bool:
 def _read_scale(node: Any) -> Any:
     scale = _find_source(node, "scale")[0]
     return tuple(float(c) for c in (scale or (1.0, 1.0, 1.0, 1.0)))
+
+
+_NORMAL = ((2.0, 2.0, 2.0), (-1.0, -1.0, -1.0))
+"""Scale and bias of an image of normals, without which its texels would be read as directions."""
+
+
+def _read_transfer(node: Any, key: str) -> Transfer | None:
+    """Transfer of an image; None if its values are its texels times factors of at least 0."""
+    bias = tuple(float(c) for c in (_find_source(node, "bias")[0] or (0.0,) * 4))
+    space = str(_find_source(node, "sourceColorSpace")[0] or "auto")
+    scale = _read_scale(node)
+    if key == "normal":
+        given = (scale[:3], bias[:3])
+        usual = given in (_NORMAL, ((1.0,) * 3, (0.0,) * 3)) and space != "sRGB"
+    else:
+        other = "raw" if key in ("diffuseColor", "emissiveColor") else "sRGB"
+        usual = not any(bias) and min(scale) >= 0.0 and space != other
+    return None if usual else Transfer(scale, bias, space)
 
 
 def _image_path(node: Any, where: str) -> str:

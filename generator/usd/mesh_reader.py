@@ -45,12 +45,14 @@ class _Topology:
         points: int64 [corners], point of each polygon corner.
         fans: int64 [m, 3], corners of the triangles.
         polygon: int64 [m], polygon of each triangle.
-        polygons: Number of polygons.
+        owners: int64 [corners], polygon of each polygon corner.
+        polygons: Number of polygons, with holes, which have no triangles.
     """
 
     points: Int64
     fans: Int64
     polygon: Int64
+    owners: Int64
     polygons: int
 
 
@@ -95,7 +97,8 @@ def read_primitive(prim: Any, place: str) -> MeshPrim:
     )
     triangles = np.arange(3 * count).reshape(-1, 3)
     polygon = np.arange(count)
-    topology = _Topology(triangles.reshape(-1), triangles, polygon, count)
+    owners = np.repeat(polygon, 3)
+    topology = _Topology(triangles.reshape(-1), triangles, polygon, owners, count)
     read = MeshPrim(corners, None, None, np.zeros(count, np.int64), materials, remarks=remarks)
     return _paint(prim, read, topology)
 
@@ -157,7 +160,10 @@ def _read_topology(mesh: Any, point_count: int, where: str) -> _Topology:
     fans = np.stack([first, first + step + 1, first + step + 2], axis=1)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         fans = fans[:, ::-1]
-    return _Topology(points, fans, np.repeat(np.arange(len(counts)), sizes), len(counts))
+    polygon = np.repeat(np.arange(len(counts)), sizes)
+    seen = ~np.isin(polygon, np.array(mesh.GetHoleIndicesAttr().Get(time) or [], dtype=np.int64))
+    owners = np.repeat(np.arange(len(counts)), counts)
+    return _Topology(points, fans[seen], polygon[seen], owners, len(counts))
 
 
 def _read_materials(
@@ -234,8 +240,7 @@ def _expand_to_corners(values: Array, interpolation: str, topology: _Topology) -
     elif interpolation in (tokens.vertex, tokens.varying):
         index = topology.points
     elif interpolation == tokens.uniform:
-        sizes = np.bincount(topology.polygon, minlength=topology.polygons) + 2
-        index = np.repeat(np.arange(topology.polygons), sizes)
+        index = topology.owners
     else:
         index = np.zeros(count, dtype=np.int64)
     return values[index] if index.max() < len(values) else None

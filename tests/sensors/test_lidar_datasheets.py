@@ -159,6 +159,48 @@ def test_a_sheet_of_a_few_lines_has_the_rest_of_a_named_scanner(tmp_path: Path) 
     assert len(make_sweep(device, 0.0).ring) == 4 * round(289352 / 10 / 16)
 
 
+FIRED_DEG = (-15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0)
+"""Elevations of the first lasers of a VLP-16, in the order in which they fire."""
+
+
+def test_lasers_listed_in_the_order_of_firing_keep_their_own_offsets(tmp_path: Path) -> None:
+    """Each pulse leaves at its laser's elevation, turned and shifted as listed for that laser."""
+    left_deg = [0.1 * k for k in range(8)]
+    side_m = [0.001 * k for k in range(8)]
+    text = (f"like: VLP-16\nelevations_deg: {list(FIRED_DEG)}\nazimuth_offsets_deg: {left_deg}\n"
+            f"lateral_offsets_m: {side_m}\nazimuth_step_deg: 90\n")  # fmt: skip
+    device = spec(tmp_path, "model: s.yaml", s_yaml=text).sensors[1].device
+    sweep = make_sweep(device, 0.0)
+
+    first = sweep.directions[:8]
+    elevation = np.degrees(np.arcsin(first[:, 2]))
+    # The first column is at 180 - 45 degrees; the axis of rotation is X = Y = 0.
+    turned = np.degrees(np.arctan2(first[:, 1], first[:, 0])) - 135.0
+    assert sweep.origins_m is not None
+    beside = np.hypot(*sweep.origins_m[:8, :2].T)
+    found = {round(float(up), 3): (round(float(a), 3), round(float(m), 6))
+             for up, a, m in zip(elevation, turned, beside, strict=True)}  # fmt: skip
+    expected = {up: (round(a, 3), m) for up, a, m in zip(FIRED_DEG, left_deg, side_m, strict=True)}
+    assert found == expected
+    assert list(elevation) == sorted(elevation, reverse=True)
+
+
+@pytest.mark.parametrize(("lasers", "offsets", "fact"), [
+    ("[-10, 5, 0, -5]", "[1, 2]", "azimuth_offsets_deg: expected one number for each of 4 lasers, "
+     "as they are not listed from the top, or fewer that repeat evenly, got 2"),
+    ("[5, 0, -5]", "[1, 2]", "expected one number for each of 3 lasers, or fewer that"),
+    ("[5, 0]", "[1, 2, 3]", "expected one number for each of 2 lasers, or fewer that"),
+    ("[{first: 5, last: 0, count: 4}]", "[1, 2, 3]", "for each of 4 lasers, or fewer"),
+])  # fmt: skip
+def test_offsets_that_belong_to_no_laser_are_refused(
+    tmp_path: Path, lasers: str, offsets: str, fact: str
+) -> None:
+    text = f"like: VLP-16\nelevations_deg: {lasers}\nazimuth_offsets_deg: {offsets}\n"
+    message = told(tmp_path, "model: s.yaml", s_yaml=text)
+    assert message.startswith("s.yaml:")
+    assert fact in message
+
+
 @pytest.mark.slow
 def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
     """0.5 degrees: 720 of each laser, at any speed of rotation; 2 s / 20 turns / 720 apart."""

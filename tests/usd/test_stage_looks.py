@@ -1,15 +1,18 @@
 """Colours, shapes, copies and labels of stages, as OpenUSD defines them."""
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.folder_index import MeshEntry
 from gen_data.assets.importer import import_object
 from gen_data.assets.readers import MeshSource, read_mesh
+from gen_data.assets.texture_maps import find_maps
 from gen_data.assets.usd_stages import stage_model
 from gen_data.core.errors import AssetError
 
@@ -194,6 +197,146 @@ def test_labels_of_older_stages(tmp_path: Path, name: str) -> None:
     stage.Save()
     (piece,) = stage_model(Folder(tmp_path), MeshEntry(file="a.usda"), "user/a").pieces
     assert (piece.thing, piece.category) == ("W", "cup")
+
+
+LIGHT, DARK = 200, 20
+"""Texels of the left and the right half of an image."""
+
+
+def linear(texel: int) -> float:
+    """By IEC 61966-2-1, of sRGB in eight bits."""
+    share = texel / 255.0
+    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
+
+
+def textured(
+    folder: Path, key: str, output: str, kind: Sdf.ValueTypeName, **inputs: object
+) -> MeshSource:
+    """Quads with a material whose input comes from an image with two halves."""
+    pixels = np.full((8, 8, 3), LIGHT, np.uint8)
+    pixels[:, 4:] = DARK
+    Image.fromarray(pixels).save(folder / "a.png")
+    stage = new_stage(folder)
+    mesh = add_quads(stage)
+    coordinates = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+        "st", Sdf.ValueTypeNames.TexCoord2fArray, "vertex"
+    )
+    coordinates.Set([(0, 0), (0.5, 0), (1, 0), (0, 1), (0.5, 1), (1, 1)])
+    image = UsdShade.Shader.Define(stage, "/W/Image")
+    image.CreateIdAttr("UsdUVTexture")
+    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set("a.png")
+    for name, value in inputs.items():
+        of = Sdf.ValueTypeNames.Token if name == "sourceColorSpace" else Sdf.ValueTypeNames.Float4
+        image.CreateInput(name, of).Set(value)
+    surface = bound_surface(stage, mesh)
+    surface.CreateInput(key, kind).ConnectToSource(image.ConnectableAPI(), output)
+    return saved(stage, folder)
+
+
+def bound_surface(stage: Usd.Stage, mesh: UsdGeom.Mesh, purpose: str = "") -> UsdShade.Shader:
+    material = UsdShade.Material.Define(stage, "/W/Paint")
+    surface = UsdShade.Shader.Define(stage, "/W/Paint/Surface")
+    surface.CreateIdAttr("UsdPreviewSurface")
+    material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
+    binding = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
+    binding.Bind(material, materialPurpose=purpose or UsdShade.Tokens.allPurpose)
+    return surface
+
+
+def texels(found: MeshSource, channel: str = "albedo") -> list[list[int]]:
+    """Middle texels of both halves of the image of a channel, as the reader gives it."""
+    (material,) = (slot.material for slot in found.soup.slots if slot.material.texture)
+    maps = find_maps(material.texture)
+    name = getattr(maps, channel) if maps else material.texture
+    pixels = np.asarray(Image.open(io.BytesIO(found.images[name.partition("!")[0]])))
+    return [pixels[4, 1].tolist(), pixels[4, 6].tolist()]
+
+
+@pytest.mark.parametrize(("inputs", "expected"), [
+    ({"scale": (-1, -1, -1, 1), "bias": (1, 1, 1, 0)}, [255 - LIGHT, 255 - DARK]),
+    ({"scale": (0.5, 0.5, 0.5, 1), "bias": (0.25, 0.25, 0.25, 0)}, [164, 74]),
+    ({"sourceColorSpace": "sRGB"}, [round(255 * linear(LIGHT)), round(255 * linear(DARK))]),
+])  # fmt: skip
+def test_roughness_is_the_image_times_scale_plus_bias(
+    tmp_path: Path, inputs: dict[str, object], expected: list[int]
+) -> None:
+    """Such as an image of glossiness, which is inverted; 0.5 x 200 + 0.25 x 255 is 163.75."""
+    found = textured(tmp_path, "roughness", "r", Sdf.ValueTypeNames.Float, **inputs)
+    assert [slot.material.roughness for slot in found.soup.slots if slot.material.texture] == [1.0]
+    assert [row[0] for row in texels(found, "roughness")] == expected
+
+
+def test_an_image_of_linear_colours_is_read_as_such(tmp_path: Path) -> None:
+    """The linear value of an sRGB texel is the texel of the file; ``auto`` means sRGB here."""
+    kind = Sdf.ValueTypeNames.Color3f
+    found = textured(tmp_path, "diffuseColor", "rgb", kind, sourceColorSpace="raw")
+    for row, texel in zip(texels(found), (LIGHT, DARK), strict=True):
+        assert 255 * linear(row[0]) == pytest.approx(texel, abs=1.0)
+    same = textured(tmp_path, "diffuseColor", "rgb", kind, sourceColorSpace="sRGB")
+    assert not same.images
+    assert [slot.material.texture for slot in same.soup.slots] == ["a.png"]
+
+
+def test_an_image_of_normals_with_y_downwards_is_turned(tmp_path: Path) -> None:
+    """Scale and bias (2, -2, 2) and (-1, 1, -1): green is inverted."""
+    kind = Sdf.ValueTypeNames.Normal3f
+    down = {"scale": (2, -2, 2, 1), "bias": (-1, 1, -1, 0)}
+    found = textured(tmp_path, "normal", "rgb", kind, **down)
+    assert texels(found, "normal") == [[t, 255 - t, t] for t in (LIGHT, DARK)]
+    usual = {"scale": (2, 2, 2, 1), "bias": (-1, -1, -1, 0), "sourceColorSpace": "raw"}
+    assert not textured(tmp_path, "normal", "rgb", kind, **usual).images
+
+
+@pytest.mark.parametrize("purpose", ["preview", "full"])
+def test_materials_that_are_bound_for_one_purpose_are_used(tmp_path: Path, purpose: str) -> None:
+    stage = new_stage(tmp_path)
+    surface = bound_surface(stage, add_quads(stage), purpose)
+    surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(RED)
+    (slot,) = saved(stage, tmp_path).soup.slots
+    assert (slot.name, slot.material.base_color) == ("Paint", (1.0, 0.0, 0.0))
+
+
+def test_the_fallback_of_a_missing_primvar_is_the_colour(tmp_path: Path) -> None:
+    stage = new_stage(tmp_path)
+    surface = bound_surface(stage, add_quads(stage))
+    reader = UsdShade.Shader.Define(stage, "/W/Reader")
+    reader.CreateIdAttr("UsdPrimvarReader_float3")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("nowhere")
+    reader.CreateInput("fallback", Sdf.ValueTypeNames.Float3).Set(BLUE)
+    given = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    given.ConnectToSource(reader.ConnectableAPI(), "result")
+    (slot,) = saved(stage, tmp_path).soup.slots
+    assert slot.material.base_color == (0.0, 0.0, 1.0)
+
+
+def test_holes_of_a_mesh_are_open_and_do_not_shift_colours_of_polygons(tmp_path: Path) -> None:
+    """Of three squares in a row the middle one is a hole; the last one stays blue."""
+    stage = new_stage(tmp_path)
+    mesh = add_quads(stage)
+    mesh.GetPointsAttr().Set([(x, y, 0) for y in (0, 1) for x in range(4)])
+    mesh.GetFaceVertexCountsAttr().Set([4, 4, 4])
+    mesh.GetFaceVertexIndicesAttr().Set([0, 1, 5, 4, 1, 2, 6, 5, 2, 3, 7, 6])
+    mesh.CreateHoleIndicesAttr([1])
+    mesh.CreateDisplayColorPrimvar("uniform").Set([RED, RED, BLUE])
+    soup = saved(stage, tmp_path).soup
+    assert soup.corners[..., 0].min(axis=1).tolist() == [0.0, 0.0, 2.0, 2.0]
+    assert soup.colors is not None
+    assert soup.colors[:, 0].tolist() == [list(RED), list(RED), list(BLUE), list(BLUE)]
+
+
+def test_inputs_of_a_material_without_a_counterpart_are_named(tmp_path: Path) -> None:
+    """Only where they have an effect: the colour of reflections in its own workflow."""
+    stage = new_stage(tmp_path)
+    surface = bound_surface(stage, add_quads(stage))
+    surface.CreateInput("specularColor", Sdf.ValueTypeNames.Color3f).Set(RED)
+    surface.CreateInput("displacement", Sdf.ValueTypeNames.Float).Set(0.0)
+    assert saved(stage, tmp_path).remarks == ()
+    surface.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(1)
+    surface.GetInput("displacement").Set(0.1)
+    assert saved(stage, tmp_path).remarks == (
+        "material 'Paint': specularColor is not used",
+        "material 'Paint': displacement is not used",
+    )
 
 
 def test_what_a_stage_holds_and_is_not_used_is_named(tmp_path: Path) -> None:

@@ -17,8 +17,8 @@ import numpy as np
 from gen_data.assets import image_decoding, texture_maps
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.readers.mesh_source import EVEN, MeshSource
-from gen_data.assets.triangle_soup import MaterialSlot, TriangleSoup, join_soups
-from gen_data.core import asset_types, errors, temporary_folders
+from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
+from gen_data.core import asset_types, colorimetry, errors, temporary_folders
 from gen_data.usd.material_reader import BoundMaterial
 from gen_data.usd.stage_reader import SUFFIXES, OpenStage, StagePart, layer_references
 
@@ -78,41 +78,80 @@ class StageFile:
         return MeshSource(join_soups(soups), images, tuple(dict.fromkeys(remarks)))
 
     def _make_slot(self, bound: BoundMaterial, images: dict[str, bytes]) -> MaterialSlot:
-        roughness, rough_map = self._factor_or_channel(
-            bound.material.roughness, bound.roughness_image
-        )
-        metallic, metal_map = self._factor_or_channel(bound.material.metallic, bound.metallic_image)
+        roughness, rough_map = self._factor_or_channel(bound, "roughness", images)
+        metallic, metal_map = self._factor_or_channel(bound, "metallic", images)
         material = self._apply_opacity_image(bound)
+        whole = self._transferred
         maps = texture_maps.TextureMaps(
-            albedo=self._relative_name(bound.texture),
-            alpha=self._channel_name(bound.alpha_image),
-            normal=self._relative_name(bound.normal_image),
+            albedo=whole(bound, "diffuseColor", self._relative_name(bound.texture), images),
+            alpha=whole(bound, "opacity", self._channel_name(bound.alpha_image), images),
+            normal=whole(bound, "normal", self._relative_name(bound.normal_image), images),
             roughness=rough_map,
             metallic=metal_map,
-            occlusion=self._channel_name(bound.occlusion_image),
-            emission=self._relative_name(bound.emission_image),
+            occlusion=whole(bound, "occlusion", self._channel_name(bound.occlusion_image), images),
+            emission=whole(
+                bound, "emissiveColor", self._relative_name(bound.emission_image), images
+            ),
             cutoff=bound.cutoff,
         )
         material = replace(material, roughness=roughness, metallic=metallic, texture=maps.name())
         if self.packed:
-            images |= {name: self.folder.read(name) for name in maps.images()}
+            names = (name for name in maps.images() if name not in images)
+            images |= {name: self.folder.read(name) for name in names}
         return MaterialSlot(bound.name, material, from_file=True)
 
-    def _factor_or_channel(self, value: float, image: tuple[str, int]) -> tuple[float, str]:
+    def _factor_or_channel(
+        self, bound: BoundMaterial, key: str, images: dict[str, bytes]
+    ) -> tuple[float, str]:
         """Factor and channel; a uniform channel is multiplied into the factor."""
+        value, image = getattr(bound.material, key), getattr(bound, f"{key}_image")
         if not image[0]:
             return value, ""
-        channel = self._pixels(image)
-        if float(channel.std()) < EVEN:
-            return round(value * float(channel.mean()) / 255.0, 4), ""
-        return value, self._channel_name(image)
+        channel = self._values(bound, key, image)
+        if float(channel.std()) < EVEN / 255.0:
+            return round(value * float(channel.mean()), 4), ""
+        return value, self._transferred(bound, key, self._channel_name(image), images)
 
     def _apply_opacity_image(self, bound: BoundMaterial) -> asset_types.Material:
         if not bound.opacity_image[0]:
             return bound.material
-        kept = float(self._pixels(bound.opacity_image).mean()) / 255.0
+        kept = float(self._values(bound, "opacity", bound.opacity_image).mean())
         opacity = round(bound.material.opacity * kept, 4)
         return replace(bound.material, opacity=opacity, transmission=0.0)
+
+    def _values(self, bound: BoundMaterial, key: str, image: tuple[str, int]) -> Float64:
+        """Values in [0, 1] of one channel of an image."""
+        texels = self._pixels(image) / 255.0
+        transfer = bound.transfers.get(key)
+        if transfer is None:
+            return texels
+        scale, bias = transfer.scale[image[1]], transfer.bias[image[1]]
+        linear = colorimetry.srgb_decode(texels) if transfer.space == "sRGB" else texels
+        return np.clip(linear * scale + bias, 0.0, 1.0)
+
+    def _transferred(
+        self, bound: BoundMaterial, key: str, name: str, images: dict[str, bytes]
+    ) -> str:
+        """Name of an image, or of one made of it by its transfer, which is added to ``images``."""
+        transfer = bound.transfers.get(key)
+        if transfer is None or not name:
+            return name
+        file, _, channel = name.partition("!")
+        path = str(self.folder.root.resolve() / file)
+        if channel:
+            values = self._values(bound, key, (path, int(channel)))[..., None].repeat(3, axis=2)
+        else:
+            texels = np.stack([self._pixels((path, k)) for k in range(3)], axis=-1) / 255.0
+            is_color = key != "normal"
+            stored = transfer.space == "sRGB" or (is_color and transfer.space == "auto")
+            linear = colorimetry.srgb_decode(texels) if stored else texels
+            values = linear * np.array(transfer.scale[:3]) + np.array(transfer.bias[:3])
+            values = np.clip(values if is_color else 0.5 * (values + 1.0), 0.0, 1.0)
+            values = colorimetry.srgb_encode(values) if is_color else values
+        numbers = ",".join(f"{value:g}" for value in (*transfer.scale, *transfer.bias))
+        made = f"{file}#{key}{channel},{numbers},{transfer.space}"
+        images[made] = _encode_png(np.rint(values * 255.0).astype(np.uint8))
+        return f"{made}!0" if channel else made
 
     def _pixels(self, image: tuple[str, int]) -> asset_types.UInt8:
         """One channel of an image; white if the image lacks it."""
@@ -141,6 +180,14 @@ class StageFile:
                 "next to the layer"
             )
         return resolved.relative_to(root).as_posix()
+
+
+def _encode_png(pixels: asset_types.UInt8) -> bytes:
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "PNG")
+    return file.getvalue()
 
 
 @contextmanager

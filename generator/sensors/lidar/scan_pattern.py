@@ -97,11 +97,12 @@ class LidarModel(Strict):
 
     Attributes:
         name: Its name in labels; empty = the name of its file.
-        elevations_deg: Elevation of every laser, or blocks of lasers from the top; none for a
-            rosette scanner. Rings are numbered from the top.
-        azimuth_offsets_deg: Offsets of the lasers to the left, repeated down the table.
+        elevations_deg: Elevation of every laser in any order, such as that of firing, or blocks of
+            lasers from the top; none for a rosette scanner. Rings are numbered from the top.
+        azimuth_offsets_deg: Offsets of the lasers to the left, one for each in the order of
+            elevations_deg; fewer are repeated down the table.
         lateral_offsets_m: Distances at which the beams pass the axis of rotation, to its left,
-            repeated down the table.
+            listed alike.
         prisms: Prisms of a rosette scanner; none for a rotating one.
         rotation_hz: Sweeps per second.
         points_per_second: Pulses per second of all lasers together; or give azimuth_step_deg.
@@ -166,6 +167,31 @@ class LidarModel(Strict):
             raise ValueError(f"range_m must rise from 0 or more, got [{low:g}, {high:g}]")
         return self
 
+    @model_validator(mode="after")
+    def _sorts_lasers(self) -> "LidarModel":
+        """Sort lasers from the top, each with its own offsets."""
+        given = self.elevations_deg
+        count = sum(one.count if isinstance(one, Block) else 1 for one in given)
+        order = list(range(count))
+        if not any(isinstance(one, Block) for one in given):
+            order.sort(key=lambda k: -cast(float, given[k]))
+        is_sorted = order == list(range(count))
+        for name in ("azimuth_offsets_deg", "lateral_offsets_m"):
+            values = getattr(self, name)
+            if not values or not count:
+                continue
+            if count % len(values) or (not is_sorted and len(values) not in (1, count)):
+                more = "" if is_sorted else ", as they are not listed from the top"
+                raise ValueError(
+                    f"{name}: expected one number for each of {count} lasers{more}, or fewer that "
+                    f"repeat evenly, got {len(values)}"
+                )
+            if len(values) == count:
+                object.__setattr__(self, name, tuple(values[k] for k in order))
+        if not is_sorted:
+            object.__setattr__(self, "elevations_deg", tuple(given[k] for k in order))
+        return self
+
     @property
     def loss_per_m(self) -> float:
         """Decay of received light with range, beyond the lidar equation's; 0 without ``seen_far``.
@@ -199,8 +225,6 @@ class LidarModel(Strict):
     def blocks(self) -> tuple[Block, ...]:
         """Blocks of lasers, from the top; a single laser is a block by itself."""
         given = self.elevations_deg
-        if not any(isinstance(one, Block) for one in given):
-            given = tuple(sorted(given, key=lambda up: -cast(float, up)))
         return tuple(
             one if isinstance(one, Block) else Block(first=one, last=one, count=1) for one in given
         )
