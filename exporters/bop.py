@@ -11,7 +11,8 @@
         rgb/000001.png  depth/000001.png            16-bit z-depth
         mask/000001_000002.png                      whole silhouette inside the image: 255
         mask_visib/000001_000002.png                its visible part
-        scene_camera.json  scene_gt.json  scene_gt_info.json  scene_gt_coco.json
+        scene_camera.json  scene_gt.json  scene_gt_info.json
+        scene_gt_coco.json  scene_gt_coco_modal.json
 
 Millimetres everywhere; a depth pixel times ``depth_scale`` is in millimetres. ``p_camera =
 cam_R_m2c @ p_model + cam_t_m2c``, camera axes as OpenCV's; matrices are written row by row. A
@@ -21,7 +22,11 @@ renderer of bop_toolkit does.
 Where BOP's conventions differ from ours:
 
 * **Boxes** of ``scene_gt_info.json`` are ``[x, y, x_max - x_min, y_max - y_min]`` with the last
-  pixel as maximum: a pixel less than COCO's, which ``scene_gt_coco.json`` has.
+  pixel as maximum: a pixel less than COCO's, which the two COCO files have.
+* **COCO files** list all models as categories in every folder. Masks and areas are the visible
+  ones; ``bbox`` of ``scene_gt_coco.json`` is around the whole silhouette inside the image, by
+  which BOP judges detections, of ``scene_gt_coco_modal.json`` around the visible pixels. This is
+  the default, and the other choice, of bop_toolkit's ``calc_gt_coco.py`` (June 2026).
 * ``px_count_all`` and ``bbox_obj`` count the silhouette outside the image too:
   ``visib_fract`` of a truncated object is below 1. All boxes of an invisible object are -1.
 * ``px_count_valid`` counts pixels of the silhouette inside the image with a depth.
@@ -67,6 +72,7 @@ MODEL_CACHE_BYTES = 64 << 20
 NO_BOX = [-1, -1, -1, -1]
 IMAGES, MODELS = "images", "models"
 MASKS = ("mask", "mask_visib")
+COCO_FILES = ("scene_gt_coco", "scene_gt_coco_modal")
 
 
 class Bop(base.AssetExporter):
@@ -165,7 +171,7 @@ class Bop(base.AssetExporter):
                     write_text(dataset_dir / "camera.json", _camera_json(images[0][1]))
                 folder = dataset_dir / split / f"{number:06d}"
                 scene = [_numbered(row, size, ids) for _, row in images]
-                _write_scene(info, folder, scene)
+                _write_scene(info, folder, scene, sorted(ids.values()))
                 for (shard_dir, _), image in zip(images, scene, strict=True):
                     self._link_image(info, camera, shard_dir, image, folder)
                 if split == "test":
@@ -248,6 +254,7 @@ def _image_facts(info: DatasetInfo, sample: Sample, camera: str) -> dict[str, An
         "index": sample.index,
         "split": sample.split,
         "size": [seen.intrinsics.width_px, seen.intrinsics.height_px],
+        "suffix": info.encoding(camera, capture.Channel.RGB).suffix,
         "camera": {
             "cam_K": _K(seen.intrinsics),
             "depth_scale": round(info.depth_scale_m * rigid_models.MM_PER_M, 9),
@@ -320,15 +327,20 @@ def _box(box: boxes.BoxPx | None) -> list[int]:
 
 
 def _coco_mask(thing: ObjectTruth, sample: Sample, camera: str) -> dict[str, Any]:
-    """COCO's keys of the visible mask; empty for an invisible object."""
+    """COCO's keys of the visible mask, with both boxes by file; empty for an invisible object."""
     if thing.box is None:
         return {}
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"
-    size = sample.truth[camera].camera.intrinsics
+    assert thing.amodal_mask is not None, "the annotation amodal_masks is in `needs`"
+    size, whole = sample.truth[camera].camera.intrinsics, thing.amodal_mask
     counts = rle.run_lengths(thing.mask, size.height_px, size.width_px)
+    around = {
+        COCO_FILES[0]: boxes.tight_box(whole.pixels, whole.x_px, whole.y_px) or thing.box,
+        COCO_FILES[1]: thing.box,
+    }
     return {
         "area": thing.visible_px,
-        "bbox": [thing.box.x_min, thing.box.y_min, thing.box.width_px, thing.box.height_px],
+        "boxes": {k: [b.x_min, b.y_min, b.width_px, b.height_px] for k, b in around.items()},
         "segmentation": {"size": [size.height_px, size.width_px], "counts": counts},
     }
 
@@ -383,11 +395,30 @@ def _numbered(row: Mapping[str, Any], size: int, ids: Mapping[str, int]) -> dict
     return {**row, "im_id": row["index"] % size, "gt": poses}
 
 
-def _write_scene(info: DatasetInfo, folder: Path, images: Sequence[Mapping[str, Any]]) -> None:
+def _write_scene(
+    info: DatasetInfo, folder: Path, images: Sequence[Mapping[str, Any]], models: Sequence[int]
+) -> None:
     for name, key in (("camera", "camera"), ("gt", "gt"), ("gt_info", "info")):
         rows = [(image["im_id"], image[key]) for image in images]
         write_text(folder / f"scene_{name}.json", _numbered_json(rows))
-    write_json(folder / "scene_gt_coco.json", _coco(info, images))
+    header = {
+        "info": {"description": info.name, "version": "1.0"},
+        "licenses": [],
+        "categories": [{"id": k, "name": str(k), "supercategory": info.name} for k in models],
+        "images": [
+            {
+                "id": image["im_id"],
+                "file_name": f"rgb/{image['im_id']:06d}{image['suffix']}",
+                "width": image["size"][0],
+                "height": image["size"][1],
+            }
+            for image in images
+        ],
+    }
+    for name in COCO_FILES:
+        # Ids start at 1: COCOeval reads 0 as "no match".
+        numbered = [{"id": k, **row} for k, row in enumerate(_coco_rows(images, name), 1)]
+        write_json(folder / f"{name}.json", {**header, "annotations": numbered})
 
 
 def _numbered_json(rows: Iterable[tuple[int, Any]]) -> str:
@@ -396,27 +427,8 @@ def _numbered_json(rows: Iterable[tuple[int, Any]]) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def _coco(info: DatasetInfo, images: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    ids = sorted({gt["obj_id"] for image in images for gt in image["gt"]})
-    return {
-        "info": {"description": info.name, "version": "1.0"},
-        "licenses": [],
-        "categories": [{"id": k, "name": str(k), "supercategory": info.name} for k in ids],
-        "images": [
-            {
-                "id": image["im_id"],
-                "file_name": f"rgb/{image['im_id']:06d}.png",
-                "width": image["size"][0],
-                "height": image["size"][1],
-            }
-            for image in images
-        ],
-        # Ids start at 1: COCOeval reads 0 as "no match".
-        "annotations": [{"id": k, **row} for k, row in enumerate(_coco_rows(images), 1)],
-    }
-
-
-def _coco_rows(images: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+def _coco_rows(images: Sequence[Mapping[str, Any]], name: str) -> Iterator[dict[str, Any]]:
+    """Rows of the COCO file of this name."""
     for image in images:
         for gt, facts, mask in zip(image["gt"], image["info"], image["coco"], strict=True):
             if mask:
@@ -427,7 +439,9 @@ def _coco_rows(images: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
                     "ignore": facts["visib_fract"] < TARGET_VISIBILITY,
                     "width": image["size"][0],
                     "height": image["size"][1],
-                    **mask,
+                    "area": mask["area"],
+                    "bbox": mask["boxes"][name],
+                    "segmentation": mask["segmentation"],
                 }
 
 

@@ -3,7 +3,7 @@
 ::
 
     training/image_2/000012.png     RGB                    training/label_2/000012.txt
-    training/depth_2/000012.png     16-bit z-depth         training/calib/000012.txt
+    training/depth_2/000012.png     z-depth, 1/256 m       training/calib/000012.txt
     training/velodyne/000012.bin    float32 x y z reflectance
     training/velodyne_labels/000012.label   uint32 category | row in label_2 << 16, from 1
     ImageSets/{train,val,test}.txt  frame names            README.txt
@@ -22,6 +22,8 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   the median, which is less than any projection of 3D boxes of .67 x .9 m.
 * **Distant objects** are not labelled, as KITTI's annotators worked on laser scans. They become
   ``DontCare`` regions; so do objects without laser points, in rain or behind others.
+* **Depth** has 256 units per metre, as KITTI's depth benchmark; images of data sets with another
+  ``depth_scale_m`` are converted.
 * **Truncation** is the fraction of that projection outside the image; for tight boxes, of the
   silhouette. KITTI computed its own "via backprojecting a car/pedestrian model into the image
   plane" (readme of its object devkit).
@@ -56,7 +58,14 @@ from gen_data.core import capture, intrinsics, scene, scene_time, se3
 from gen_data.core.boxes import BoxPx
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.exporters import base, image_files, point_cloud_io, sensor_selection, velodyne
+from gen_data.exporters import (
+    base,
+    image_files,
+    point_cloud_io,
+    rgbd_sequences,
+    sensor_selection,
+    velodyne,
+)
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.kitti_boxes import UprightBox, members_in_box, upright_box
 from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
@@ -83,6 +92,9 @@ DONT_CARE = "DontCare"
 
 T_CAMERA_FORWARD = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
 """Calibration without a scanner, [3, 4]: scanner axes (X forward, Y left, Z up) at the camera."""
+
+DEPTH_UNITS_PER_M = 256
+"""Of KITTI's depth images (readme of its depth benchmark); OpenPCDet reads ``depth_2`` by it."""
 
 NEAR_M = 0.05
 """Boxes with a corner nearer than this depth are not projected."""
@@ -167,6 +179,11 @@ class Kitti(base.ExporterBase):
                 labels = point_labels(points, members, rows)
                 write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
             write_text(folder / f"label_2/{frame}.txt", "".join(f"{row}\n" for row, _ in rows))
+            if self._converts_depth(info):
+                depth = rgbd_sequences.depth_png(
+                    info, shard_dir, camera, sample.index, DEPTH_UNITS_PER_M
+                )
+                write_bytes(folder / f"depth_2/{frame}.png", depth)
             frames.append(f"{sample.index} {sample.split}\n")
         write_text(folder / "frames.txt", "".join(frames))
 
@@ -210,16 +227,22 @@ class Kitti(base.ExporterBase):
         links = [(shard_dir / f"{self.type}/{name}", name) for name in names]
         rgb = media_path(shard_dir, camera, capture.Channel.RGB, index)
         links.append((rgb, f"image_2/{frame}.png"))
-        if capture.Channel.Z_DEPTH in info.media[camera]:
+        if self._converts_depth(info):
+            links.append((shard_dir / f"{self.type}/depth_2/{frame}.png", f"depth_2/{frame}.png"))
+        elif capture.Channel.Z_DEPTH in info.media[camera]:
             depth = media_path(shard_dir, camera, capture.Channel.Z_DEPTH, index)
             links.append((depth, f"depth_2/{frame}.png"))
         return links
+
+    def _converts_depth(self, info: DatasetInfo) -> bool:
+        """Whether there are images of depth, in units other than KITTI's."""
+        has_depth = capture.Channel.Z_DEPTH in info.media[self._camera(info)]
+        return has_depth and info.depth_scale_m != 1.0 / DEPTH_UNITS_PER_M
 
     def _readme(self, info: DatasetInfo, camera: str) -> str:
         return _README.format(
             name=info.name,
             camera=camera,
-            scale=info.depth_scale_m,
             points=_SCANNED.format(lidar=self._lidar(info)) if self._lidar(info) else "",
             boxes=_BOXES[self.boxes],
             truncated="3D box's projection" if self.boxes == "projected" else "silhouette",
@@ -481,8 +504,8 @@ _README = """\
 
 training/   All frames; ImageSets/*.txt say which split each belongs to.
 image_2     RGB.
-depth_2     z-depth, 16-bit: metres = value * {scale}; 0 = nothing or out of range. Present when
-            the data set keeps depth images.
+depth_2     z-depth, 16-bit: metres = value / 256; 0 = nothing or out of range. Present when the
+            data set keeps depth images.
 calib       P0 = P1 = P2 = P3, pixel centres at whole numbers; R0_rect = identity, so the rectified
             frame is the camera's: X right, Y down, Z forward. The virtual IMU is at the scanner.
 {points}label_2     type truncated occluded alpha left top right bottom h w l x y z rotation_y

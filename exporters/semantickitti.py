@@ -5,7 +5,7 @@
     sequences/00/velodyne/000000.bin   float32 x y z intensity
     sequences/00/labels/000000.label   uint32, class | instance << 16
     sequences/00/calib.txt             P0 to P3, Tr
-    sequences/00/poses.txt             camera i in camera 0, 3 x 4
+    sequences/00/poses.txt             camera i in camera 0 at the sweeps' instants, 3 x 4
     sequences/00/times.txt             seconds
     split.yaml                         sequences of each split, as semantic-kitti.yaml lists them
 
@@ -161,7 +161,7 @@ class SemanticKitti(base.ExporterBase):
             row = {
                 "scene": sample.scene_index,
                 "time_s": sensor_selection.stamp_s(sample, lidar),
-                "T_world_camera": mounted_pose(sample.scene, eye),
+                "T_world_camera": mounted_pose(sample.scene_of(lidar), eye),
                 "calib": _calib(sample.scene, camera, lidar),
             }
             rows.append(frame_facts(info, sample) | row)

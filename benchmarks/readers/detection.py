@@ -42,7 +42,9 @@ def by_pycocotools_in_bop(root: Path) -> Iterator[View]:
     """BOP's annotations in COCO's format; images are counted in each split."""
     known = json.loads((root / "objects.json").read_bytes())
     names = {int(number): row["category"] for number, row in known.items()}
-    paths = [p for s in ("train", "val") for p in sorted(root.glob(f"{s}/*/scene_gt_coco.json"))]
+    paths = [
+        p for s in ("train", "val") for p in sorted(root.glob(f"{s}/*/scene_gt_coco_modal.json"))
+    ]
     for index, view in enumerate(coco_views(*paths, names=names)):
         yield View(f"{index:09d}_color", view.things)
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import itertools
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -189,23 +190,41 @@ def test_models_in_the_written_poses_give_the_images(dataset: Path) -> None:
     assert sum(len(v) for p in dataset.glob("*/*/scene_gt.json") for v in read(p).values()) >= 15
 
 
-def test_coco_rows_are_the_visible_masks_and_equal_geometries_share_a_model(dataset: Path) -> None:
-    """With COCO's boxes, a pixel wider than BOP's, and ids from 1."""
-    for folder in sorted(dataset.glob("train/*")):
+def test_coco_files_have_visible_masks_and_boxes_of_either_and_all_models(dataset: Path) -> None:
+    """As calc_gt_coco.py of bop_toolkit makes them: by default boxes bound the file of ``mask``.
+
+    Boxes are COCO's, a pixel wider than BOP's; ids count from 1. Categories are the models of the
+    data set, the same in all folders.
+    """
+    models = sorted(map(int, read(dataset / "models/models_info.json")))
+    hidden = 0
+    for folder, (name, kind) in itertools.product(
+        sorted(dataset.glob("train/*")),
+        {"scene_gt_coco": "mask", "scene_gt_coco_modal": "mask_visib"}.items(),
+    ):
         with contextlib.redirect_stdout(io.StringIO()):
-            truth = COCO(str(folder / "scene_gt_coco.json"))
+            truth = COCO(str(folder / f"{name}.json"))
         poses = read(folder / "scene_gt.json")
         assert [str(k) for k in truth.imgs] == list(poses)
+        assert truth.getCatIds() == models
         for im_id, things in poses.items():
+            assert (folder / truth.imgs[int(im_id)]["file_name"]).is_file()
             rows = truth.imgToAnns[int(im_id)]
             assert [r["category_id"] for r in rows] == [gt["obj_id"] for gt in things]
             for k, row in enumerate(rows):
-                mask = image(folder / f"mask_visib/{int(im_id):06d}_{k:06d}.png") == 255
+                stem = f"{int(im_id):06d}_{k:06d}.png"
+                mask = image(folder / "mask_visib" / stem) == 255
                 np.testing.assert_array_equal(truth.annToMask(row).astype(bool), mask)
-                assert row["bbox"] == coco_mask.toBbox(truth.annToRLE(row)).tolist()
+                x, y, width, height = box(image(folder / kind / stem))
+                assert row["bbox"] == [x, y, width + 1, height + 1]
                 assert row["area"] == mask.sum()
+                hidden += row["bbox"] != coco_mask.toBbox(truth.annToRLE(row)).tolist()
         assert min(truth.anns, default=1) == 1
-    # Two crates of different shapes are two objects, in all frames the same ones.
+    assert hidden > 0
+
+
+def test_equal_geometries_share_a_model(dataset: Path) -> None:
+    """Two crates of different shapes are two objects, in all frames the same ones."""
     assert {k: v["asset"] for k, v in read(dataset / "objects.json").items()} == {
         "1": "primitive/box/car",
         "2": "primitive/box/crate",

@@ -204,10 +204,9 @@ def named_in_xml(path: Path, name: str) -> str:
     return node.get("name") or str(node.text)
 
 
-COCO = "annotations/{}_train.json"
+BOP, COCO = "train/000000/", "annotations/{}_train.json"
 PHOTOGRAPHS: dict[str, Callable[[Path], Path]] = {
-    # By number, as bop_toolkit looks for either ending.
-    "bop": lambda f: next((f / "train/000000/rgb").glob("000000.*")),
+    "bop": lambda f: f / BOP / document(f, BOP + "scene_gt_coco.json")["images"][0]["file_name"],
     "coco": lambda f: f / "train" / document(f, COCO.format("instances"))["images"][0]["file_name"],
     "coco_panoptic": lambda f: (
         f / "train" / document(f, COCO.format("panoptic"))["images"][0]["file_name"]

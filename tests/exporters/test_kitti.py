@@ -164,6 +164,23 @@ def test_every_frame_has_every_file_with_official_types_and_others_misc(dataset:
     assert sizes_m == [car, person, crate, crate, person]
 
 
+@pytest.mark.parametrize("depth_scale_m", [0.001, 1 / 256])
+def test_depth_has_256_units_per_metre_whatever_the_data_set_has(
+    depth_scale_m: float, world: Any, tmp_path: Path
+) -> None:
+    """As KITTI's depth benchmark and OpenPCDet read it; images in these units are linked."""
+    info = world.info(7, depth_scale_m=depth_scale_m)
+    folder = world.export(kitti.Kitti(), info, world.samples, tmp_path)
+    for sample in world.samples:
+        path = folder / f"training/depth_2/{sample.index:06d}.png"
+        read_m = np.asarray(Image.open(path)) / 256.0
+        true_m = sample.capture.readings["color"].channels[Channel.Z_DEPTH]
+        expected_m = np.where(true_m < 65_535 * depth_scale_m, true_m, 0.0)
+        np.testing.assert_allclose(read_m, expected_m, atol=0.5 / 256 + 0.5 * depth_scale_m)
+        # One file in the shard and in the data set.
+        assert path.stat().st_nlink == 2
+
+
 def test_calibrations_and_rows_have_kittis_pixels_and_columns() -> None:
     """The centred camera of W pixels has cx = (W - 1) / 2 in KITTI."""
     rows = dict(line.split(": ") for line in kitti.calib_text(CAMERA.intrinsics).splitlines())

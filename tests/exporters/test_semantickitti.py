@@ -1,13 +1,15 @@
 """SemanticKITTI: sequences, poses and classes."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from gen_data.core.scene_time import scene_at
 from gen_data.exporters.semantickitti import SemanticKitti
-from tests.exporters.drives import calibration, stems
+from tests.exporters.drives import calibration, drive_info, stems
 
 
 def poses(folder: Path) -> list[Any]:
@@ -45,6 +47,27 @@ def test_semantic_sequences_have_poses_of_the_drive_and_points_that_stay_in_the_
         assert np.linalg.norm(local[:3].T - centre, axis=1).max(initial=0.0) < 1.0
         seen += len(mine)
     assert seen > 10
+
+
+def test_poses_are_those_of_the_sweeps_which_may_be_later_than_their_steps(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """A method that joins scans moves points by Tr^-1 pose Tr of the instant when they were hit."""
+    late_s = [0.0, 0.02, 0.05, 0.01]
+    drive = []
+    for sample in samples:
+        scene = scene_at(sample.scene, sample.scene.time_s + late_s[sample.step_index])
+        cloud = sample.capture.clouds["top"]
+        cloud = replace(cloud, lidar=scene.lidar("top"), time_s=scene.time_s)
+        capture = replace(sample.capture, clouds={"top": cloud})
+        drive.append(replace(sample, capture=capture, instants={"top": scene}))
+    folder = world.export(SemanticKitti(), drive_info(world), drive, tmp_path) / "sequences/00"
+    Tr = np.vstack([calibration(folder / "calib.txt")["Tr"].reshape(3, 4), [0, 0, 0, 1]])
+    for k, pose in enumerate(poses(folder)):
+        moved = np.linalg.inv(Tr) @ pose @ Tr
+        # The trajectory has knots of the circle every 0.1 s.
+        expected = world.ego_pose(0.1 * k + late_s[k]).matrix()
+        np.testing.assert_allclose(moved, expected, atol=3e-3)
 
 
 def test_semantic_classes_of_things_that_move(exported: Any) -> None:
