@@ -21,16 +21,13 @@ from tests.renderers.fake_library import (
     FakeLibrary,
     box_mesh,
     camera_at,
+    ground,
     plane_mesh,
     sphere_mesh,
 )
 from tests.renderers.images import OPEN, drawn, seen
 
 WHITE = (1.0, 1.0, 1.0)
-
-
-def ground(material: Material = MATTE) -> FakeLibrary:
-    return FakeLibrary({"plane": plane_mesh(20.0, (material,)), "box": box_mesh()})
 
 
 def from_above(size_px: tuple[int, int] = (48, 36)) -> Camera:
