@@ -244,7 +244,7 @@ def test_a_glass_ball_shows_the_world_upside_down_where_snell_says() -> None:
 def test_a_mirror_shows_the_mirrored_scene() -> None:
     """A box before a perfect mirror equals the same box behind a window: all but 1 % of pixels.
 
-    The sun shines along the mirror, so that both boxes are lit alike.
+    The sun shines along the mirror: both boxes are lit alike.
     """
     mirror = Material((1, 1, 1), 0.0, 1.0)
     meshes = {"box": box_mesh((0.4, 0.6, 0.3), (MATTE,)), "mirror": plane_mesh(8.0, (mirror,))}

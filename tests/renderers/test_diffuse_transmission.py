@@ -26,7 +26,7 @@ UNIFORM = Environment(luminance_cd_m2=100.0)
 
 
 def sheet(material: Material = LEAF, normal: Vec3 = (0.0, 0.0, 1.0)) -> MeshData:
-    """A level square of 4 m whose smooth normals may differ from those of its face."""
+    """A level square of 4 m whose smooth normals may differ from its face's."""
     flat = plane_mesh(4.0, (material,))
     unit = np.array(normal) / np.linalg.norm(normal)
     return replace(flat, normals=np.tile(unit, (4, 1)).astype(np.float32))

@@ -47,7 +47,7 @@ def schlick(f0: float, angle_rad: float) -> float:
 
 
 def test_behind_a_pane_a_wall_is_seen_dimmed_on_both_ways() -> None:
-    """Its range is its own, its reflectance that of the wall times the pane's squared."""
+    """Its range is undisturbed, its reflectance the wall's times the pane's squared."""
     bodies = (
         Body("pane", "pane", SE3((10.0, 0.0, 0.0)), instance_id=1),
         Body("wall", "wall", SE3((15.1, 0.0, 0.0)), instance_id=2),

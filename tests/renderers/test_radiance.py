@@ -50,7 +50,7 @@ def test_an_edge_is_as_grey_as_it_is_covered(
 
 
 def test_anti_aliasing_does_not_touch_labels() -> None:
-    """Ids and depth are those of pixel centres, with or without it."""
+    """Ids and depth belong to pixel centres, with or without it."""
     scene = Scene("t", (Body("b", "ball", SE3((0.1, 0.0, 2.0)), instance_id=3),))
     wanted = (Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH)
     images = [

@@ -162,7 +162,7 @@ OVERHEAD = Light("s", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=400.0,
 def shadow_profile(light: Light, settings: RenderSettings = OPEN) -> tuple[np.ndarray, np.ndarray]:
     """Luminance on the ground along x past the edge of a slab 0.52 m up.
 
-    Relative to what it would be without the slab.
+    Relative to the luminance without the slab.
     """
     library = FakeLibrary({"plane": plane_mesh(20.0, (MATTE,)), "slab": box_mesh((0.6, 4.0, 0.02))})
     bodies = (Body("p", "plane"), Body("slab", "slab", SE3((0.0, 0.0, 0.51))))

@@ -73,7 +73,7 @@ def test_every_variant_is_as_big_as_real_ones_and_in_budget(name: str, how_many:
         low, high = built.body_bounds_m or mesh.bounds_m()
         painted = with_role(mesh, "paint")
         side = np.abs(painted[..., 1])
-        # Mirror housings are painted too: what is beside the body's middle tells its width.
+        # Mirror housings are painted too: the width is measured at the body's middle.
         body = side[np.abs(painted[..., 0]) < 0.1 * (high[0] - low[0])]
         assert lengths[0] <= high[0] - low[0] <= lengths[1], seed
         assert heights[0] <= high[2] <= heights[1], seed
@@ -383,7 +383,7 @@ def test_text_on_the_sides_reads_from_left_to_right() -> None:
 MIRROR_M = {
     **dict.fromkeys(FROM_CARS, 0.25), "truck": 0.2, "fire_engine": 0.2, "bus": 0.3, "tractor": 0.3,
 }  # fmt: skip
-"""Width of both mirrors beside the body: at least this [m]."""
+"""Width of both mirrors next to the body: at least this [m]."""
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -413,5 +413,5 @@ def test_the_body_is_as_wide_as_registered_and_leaves_out_mirrors_only(name: str
         assert body_low[2] == low[2] and body_low[0] == low[0]
         # Rods of antennas are 0.2 m high.
         assert 0.0 <= high[2] - body_high[2] <= (0.25 if name in FROM_CARS else 0.0)
-        # Only those of buses hang in front.
+        # Only mirrors of buses hang in front.
         assert (body_high[0] < high[0]) == (name == "bus")
