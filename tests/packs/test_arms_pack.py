@@ -150,7 +150,7 @@ def test_flanges_are_where_their_maker_says(arms: Library, name: str) -> None:
 @NEEDS_ARMS
 @pytest.mark.parametrize("name", sorted(DH))
 def test_hands_look_down_at_home_ahead_of_the_base(arms: Library, name: str) -> None:
-    """Within a degree, and less than 3 cm beside the middle."""
+    """Within a degree, and less than 3 cm from the middle."""
     robot = arms.robot(f"arms/{name}")
     assert robot.gripper is not None
     pose = link_poses(robot, SE3(), robot.home)[robot.gripper.link] @ robot.gripper.T_link_grasp

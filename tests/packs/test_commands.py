@@ -43,7 +43,7 @@ def test_list_finds_assets_by_tags(tmp_path: Path) -> None:
     (("user",), "no asset has the tag 'user'"),
 ])  # fmt: skip
 def test_a_list_without_an_asset_tells_why(tags: tuple[str, ...], said: str) -> None:
-    """Instead of nothing, with which a misspelt tag looks like a thing that is not there."""
+    """A misspelt tag is not mistaken for an asset that is not installed."""
     done = CliRunner().invoke(cli, ["assets", "list", *tags])
 
     assert isinstance(done.exception, AssetError)

@@ -4,13 +4,14 @@ import base64
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from gen_data.assets import image_decoding, installed_packs
-from gen_data.assets.library import open_library
+from gen_data.assets.library import Library, open_library
 from gen_data.content.packs import panoramas, robosuite, sweethome3d
 from gen_data.content.packs.sweethome3d import (
     Group,
@@ -45,7 +46,7 @@ def test_the_selection_is_sound() -> None:
 
 
 def test_every_vehicle_that_drives_has_wheels_in_order() -> None:
-    """Front before rear, left before right, on the side that the name says (left is +Y)."""
+    """Front before rear, left before right, on the side in their name (left is +Y)."""
     selection = read_selection()
     vehicles = selection.groups["vehicles"]
     driving = {"car", "van", "truck", "bus"}
@@ -91,19 +92,7 @@ def test_sizes_and_creators_come_from_the_package(tmp_path: Path) -> None:
     assert models["Ble/box/box.obj"].licence == "CC0-1.0"
 
 
-def test_a_point_beside_the_middle_stands_for_two() -> None:
-    choice = ModelChoice(
-        id="car", category="car", model="car.obj", keypoints={"wheel_front": (1.2, 0.7, 0.3)}
-    )
-    entry = mesh_entry(choice, Group(models=()), _model(Path()), {})
-    assert [(p.name, p.position_m) for p in entry.keypoints] == [
-        ("wheel_front_left", (1.2, 0.7, 0.3)),
-        ("wheel_front_right", (1.2, -0.7, 0.3)),
-    ]
-
-
-@pytest.mark.parametrize("view", ["side", "ahead"])
-def test_a_wheel_counts_as_seen_from_the_side_and_from_ahead(view: str) -> None:
+def test_the_hub_of_a_wheel_stands_for_two_which_count_as_seen_from_the_side_and_ahead() -> None:
     """A hub 0.3 m high in a tyre 0.2 m wide: 0.1 m deep from the side, 0.3 m from ahead.
 
     The far hub, 1.4 m behind the near one, is hidden either way.
@@ -113,12 +102,13 @@ def test_a_wheel_counts_as_seen_from_the_side_and_from_ahead(view: str) -> None:
     )
     left, right = mesh_entry(choice, Group(models=()), _model(Path()), {}).keypoints
 
-    assert left.radius_m == right.radius_m
-    assert {"side": 0.1, "ahead": 0.3}[view] < left.radius_m < 1.4 - 0.2
+    assert (left.name, left.position_m) == ("wheel_front_left", (1.2, 0.7, 0.3))
+    assert (right.name, right.position_m) == ("wheel_front_right", (1.2, -0.7, 0.3))
+    assert 0.3 < left.radius_m == right.radius_m < 1.4 - 0.2
 
 
 def test_what_fits_between_fingers_is_graspable() -> None:
-    """One of its edges must be at most 7 cm; the package says 20 x 10 x 40 cm."""
+    """One of its edges must be at most 7 cm; the package states 20 x 10 x 40 cm."""
     choice = ModelChoice(id="mug", category="mug", model="mug.obj")
     for size_m, graspable in ((None, False), (0.28, True)):
         sized = choice.model_copy(update={"size_m": size_m})
@@ -138,21 +128,28 @@ def test_lamps_are_cut_out_on_both_sides() -> None:
     ]
 
 
+def library_with_box(tmp_path: Path, entry: dict[str, Any]) -> Library:
+    """A library with ``test/box``, black and a quarter opaque, whose index entry has these keys."""
+    folder = tmp_path / "packs" / "test"
+    folder.mkdir(parents=True)
+    (folder / "box.mtl").write_text("newmtl pane\nKd 0 0 0\nd 0.25\n", encoding="utf-8")
+    text = "mtllib box.mtl\nusemtl pane\n" + BOX
+    (folder / "box.obj").write_text(text, encoding="utf-8")
+    entry = {"id": "box", "file": "box.obj", "category": "box", "up": "z", **entry}
+    (folder / "index.json").write_text(json.dumps({"assets": [entry]}), encoding="utf-8")
+    return open_library(cache_dir=tmp_path / "cache", packs=tmp_path / "packs")
+
+
 @pytest.mark.slow
 def test_a_region_takes_its_triangles_and_no_others(tmp_path: Path) -> None:
     """The upper face of a box becomes a lamp: 2 of 12 triangles."""
-    folder = tmp_path / "packs" / "test"
-    folder.mkdir(parents=True)
-    (folder / "box.obj").write_text(BOX, encoding="utf-8")
     entry = {
-        "id": "box", "file": "box.obj", "category": "box", "up": "z", "subcategory": "cube",
-        "attributes": {"pose": "standing"},
+        "subcategory": "cube", "attributes": {"pose": "standing"},
         "keypoints": [{"name": "lamp", "position_m": [0, 0, 0.5]}],
         "regions": [{"material": "*", "low_m": [-1, -1, 0.45], "high_m": [1, 1, 0.55],
                      "finish": {"role": "lamp", "specular": 0.9}}],
     }  # fmt: skip
-    (folder / "index.json").write_text(json.dumps({"assets": [entry]}), encoding="utf-8")
-    library = open_library(cache_dir=tmp_path / "cache", packs=tmp_path / "packs")
+    library = library_with_box(tmp_path, entry)
     mesh = library.mesh("test/box")
     roles = [mesh.materials[slot].role for slot in mesh.face_slots]
     assert (len(roles), roles.count("lamp")) == (12, 2)
@@ -169,16 +166,8 @@ def test_a_region_takes_its_triangles_and_no_others(tmp_path: Path) -> None:
 def test_a_finish_with_a_colour_hides_what_the_files_surface_let_through(
     finish: dict[str, object], expected: tuple[object, float, float], tmp_path: Path
 ) -> None:
-    """A quarter opaque in the file; a finish without a colour keeps it so, or it says otherwise."""
-    folder = tmp_path / "packs" / "test"
-    folder.mkdir(parents=True)
-    (folder / "box.mtl").write_text("newmtl pane\nKd 0 0 0\nd 0.25\n", encoding="utf-8")
-    text = "mtllib box.mtl\nusemtl pane\n" + BOX
-    (folder / "box.obj").write_text(text, encoding="utf-8")
-    entry = {"id": "box", "file": "box.obj", "category": "box", "up": "z",
-             "materials": {"pane": finish}}  # fmt: skip
-    (folder / "index.json").write_text(json.dumps({"assets": [entry]}), encoding="utf-8")
-    library = open_library(cache_dir=tmp_path / "cache", packs=tmp_path / "packs")
+    """A quarter opaque in the file; a finish without a colour keeps it so, or states another."""
+    library = library_with_box(tmp_path, {"materials": {"pane": finish}})
     (material,) = library.mesh("test/box").materials
     assert (material.base_color, material.opacity, material.transmission) == expected
 

@@ -1,7 +1,5 @@
 """A data set records the packs it may draw from, and their attribution."""
 
-import zipfile
-from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -10,10 +8,9 @@ from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.assets.paths import packs_dir
 from gen_data.packs.install import install
-from gen_data.packs.pack_table import Pack
 from gen_data.runner.identity import format_licences, make_plan
 from gen_data.runner.plan import compare_plans
-from tests.packs.converters import BOX
+from tests.packs.converters import box_pack, zipped_box
 
 
 @pytest.fixture
@@ -24,21 +21,8 @@ def factory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> PipelineFactory:
 
 
 def installed_box(tmp_path: Path, side: str) -> None:
-    archive = tmp_path / f"{side}.zip"
-    with zipfile.ZipFile(archive, "w") as file:
-        file.writestr("data/box.obj", BOX.replace("v 1", f"v {side}"))
-    pack = Pack(
-        name="boxes",
-        summary="a box",
-        client="pip",
-        package="package",
-        version="1.0",
-        sha256=sha256(archive.read_bytes()).hexdigest(),
-        licence="CC-BY-3.0",
-        wanted=("data/*",),
-        converter="tests.packs.converters:box",
-    )
-    install(pack, packs_dir(), archive)
+    archive = zipped_box(tmp_path / f"{side}.zip", side)
+    install(box_pack(archive), packs_dir(), archive)
 
 
 def test_without_packs_a_plan_names_none(factory: PipelineFactory) -> None:

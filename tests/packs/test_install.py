@@ -4,9 +4,7 @@ import multiprocessing
 import os
 import signal
 import stat
-import zipfile
 from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -16,31 +14,17 @@ from gen_data.assets.library import Library, open_library
 from gen_data.core.errors import AssetError, StorageError, VerificationError
 from gen_data.packs.install import install, is_installed, remove, verify
 from gen_data.packs.pack_table import PACKS, ClientName, Pack, find_pack
-from tests.packs.converters import BOX
+from tests.packs.converters import BOX, box_pack, zipped_box
 
 
 @pytest.fixture
 def archive(tmp_path: Path) -> Path:
-    path = tmp_path / "package-1.0.zip"
-    with zipfile.ZipFile(path, "w") as file:
-        file.writestr("data/box.obj", BOX)
-        file.writestr("package/__init__.py", "raise SystemExit('imported')")
-    return path
+    return zipped_box(tmp_path / "package-1.0.zip")
 
 
 @pytest.fixture
 def pack(archive: Path) -> Pack:
-    return Pack(
-        name="boxes",
-        summary="a box",
-        client="pip",
-        package="package",
-        version="1.0",
-        sha256=sha256(archive.read_bytes()).hexdigest(),
-        licence="CC-BY-3.0",
-        wanted=("data/*",),
-        converter="tests.packs.converters:box",
-    )
+    return box_pack(archive)
 
 
 @pytest.fixture
@@ -50,11 +34,13 @@ def installed(pack: Pack, archive: Path, tmp_path: Path) -> Path:
     return tmp_path / "packs"
 
 
-def fake_client(folder: Path, program: str, script: str) -> None:
-    folder.mkdir(exist_ok=True)
+def fake_client(monkeypatch: pytest.MonkeyPatch, folder: Path, program: str, script: str) -> None:
+    """Let a script be the only program on the path."""
+    folder.mkdir()
     path = folder / program
     path.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
     path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", str(folder))
 
 
 def library_with(folder: Path, tmp_path: Path) -> Library:
@@ -98,10 +84,9 @@ def test_the_client_fetches_the_pinned_version(
     client: ClientName, program: str, pack: Pack, archive: Path, tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    """It is called with package and version, in a folder of its own."""
-    fake_client(tmp_path / "bin", program,
-                f'/bin/echo "$@" > {tmp_path}/called; /bin/cp {archive} .')  # fmt: skip
-    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    """It is called with package and version, in a separate folder."""
+    script = f'/bin/echo "$@" > {tmp_path}/called; /bin/cp {archive} .'
+    fake_client(monkeypatch, tmp_path / "bin", program, script)
     install(replace(pack, client=client), tmp_path / "packs")
     called = (tmp_path / "called").read_text(encoding="utf-8")
     assert "package" in called and "1.0" in called
@@ -126,8 +111,7 @@ def test_no_network_and_other_failures_are_told_apart(
     said: str, told: str, pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The client's message is shown unless the reason is known."""
-    fake_client(tmp_path / "bin", "pip", f'echo "{said}" >&2; exit 1')
-    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    fake_client(monkeypatch, tmp_path / "bin", "pip", f'echo "{said}" >&2; exit 1')
     with pytest.raises(AssetError, match=told):
         install(pack, tmp_path / "packs")
     assert names_in(tmp_path / "packs") == set()

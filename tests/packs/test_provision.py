@@ -24,7 +24,7 @@ TEDDY = "pybullet/teddy"
 def index(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> Callable[[str], None]:
-    """A machine without pybullet; its package client does what the function is told."""
+    """A machine without pybullet; its package client runs the script handed to the function."""
     without_pybullet(monkeypatch)
     kinds = getattr(request, "param", KINDS)
     wheel = pack_wheel(tmp_path / "pybullet.whl", kinds)
@@ -59,7 +59,7 @@ def calls(tmp_path: Path) -> int:
 def test_they_are_fetched_when_an_asset_is_wanted(
     wanted: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """One line tells what, from where, how much, and the licence; the second time, nothing."""
+    """One line names files, source, size and licence; the second time, nothing."""
     ask = {
         "an id": lambda library: library.get(TEDDY),
         "the id of a link": lambda library: library.mesh("franka_panda/panda_link0"),
@@ -88,7 +88,7 @@ def test_they_are_not_fetched_for_anything_else(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("index")
 def test_nothing_is_fetched_if_forbidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What needs none of these files works, and the others name the command."""
+    """Assets of other packages work, and errors of these name the command."""
     monkeypatch.setenv("GEN_DATA_OFFLINE", "1")
     library = open_assets()
 
@@ -135,7 +135,7 @@ def test_processes_that_start_together_fetch_once(
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [("",)], indirect=True, ids=["all files"])
 def test_a_run_fetches_them_before_workers(index: Callable[[str], None], tmp_path: Path) -> None:
-    """The check of a configuration needs them already; arms and things on the table are there."""
+    """The check of a configuration needs them already; arms and objects on the table are there."""
     factory = PipelineFactory(load_config("tabletop.yaml"), n=1)
 
     factory.check()
@@ -145,7 +145,7 @@ def test_a_run_fetches_them_before_workers(index: Callable[[str], None], tmp_pat
 
 
 def test_programs_open_the_library_that_provides_them() -> None:
-    """``open_assets``; only ``assets check`` and ``install`` work on what is there already."""
+    """``open_assets``; only ``assets check`` and ``install`` work on installed packs."""
     opened = {
         path.relative_to(ROOT).as_posix()
         for folder in ("generator", "content", "lab", "randomizers", "exporters", "scene_templates")

@@ -36,7 +36,7 @@ def test_a_person_has_one_box_all_along_a_stride_and_never_leaves_it(pose: str) 
 def test_boxes_of_walking_people_are_as_large_as_those_of_annotators() -> None:
     """Mean sizes of KITTI's pedestrians (Frustum PointNets, CVPR 2018): .844 x .661 m.
 
-    Of eight people, four of whom hardly move their feet: within a tenth.
+    Of eight people, four of whom barely move their feet: within a tenth.
     """
     poses = ("walk", "walk_fast", "stroll", "stand") * 2
     sizes_m = [person(pose, 0.3, "annotated", seed).box3d.size_m for seed, pose in enumerate(poses)]

@@ -47,7 +47,7 @@ def test_fingers_at_rest_lie_side_by_side_and_flex_more_from_index_to_little(sid
 @NEEDS_PACK
 @pytest.mark.parametrize("pose", ["stand_umbrella", "stand_cup", "stand_closed_umbrella"])
 def test_what_is_held_touches_palm_and_fingers_without_filling_the_hand(pose: str) -> None:
-    """Some vertices of the hand lie within 1 cm of the thing; the wrist's joint does not."""
+    """Some vertices of the hand lie within 1 cm of the object; the wrist's joint does not."""
     person = draw_person(5, pose)
     solid = build_person(person, dress_person(person, body_of("pack")))
     mesh = solid.mesh

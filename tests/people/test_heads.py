@@ -47,7 +47,7 @@ def test_brows_and_lips_lie_where_the_body_has_them() -> None:
 
 
 def test_a_beard_darkens_the_jaw_only() -> None:
-    """The chin is darker than that of a woman, the cheek under the eye is not."""
+    """The chin is darker than a woman's, the cheek under the eye is not."""
     names = list(FACES)
     chin, cheek = head_layout.lay_out_head(np.array([(0.148, 0.005, 0.632), (0.13, 0.045, 0.705)]))
     bearded, bare = face(names.index("man_bearded")), face(names.index("woman"))

@@ -1,4 +1,4 @@
-"""Who people are, before anything is built; and what is offered for selection."""
+"""Traits of people, before anything is built; and people offered for selection."""
 
 import importlib
 from pathlib import Path
@@ -35,7 +35,7 @@ def test_one_person_in_ten_is_a_child() -> None:
 
 
 def test_a_pose_or_a_phase_leaves_the_person_the_same() -> None:
-    """Pose has a stream of its own; sixteen phases of a stride need as many meshes."""
+    """Pose has a separate stream; sixteen phases of a stride need as many meshes."""
     walking, sitting = draw_person(7, "walk", 0.5), draw_person(7, "sit")
     assert walking.outfit == sitting.outfit and walking.skin == sitting.skin
     assert walking.height_m == sitting.height_m

@@ -54,7 +54,7 @@ def test_standing_people_are_as_tall_as_their_facts_say(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_people_have_cocos_seventeen_keypoints_in_its_order(kind: str) -> None:
-    """Names and order are those of the COCO data set."""
+    """Names and order as in the COCO data set."""
     keypoints = made(draw_person(0), kind).keypoints
     assert [point.name for point in keypoints] == COCO_17
 

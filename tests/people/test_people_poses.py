@@ -63,7 +63,7 @@ def test_normals_of_a_flat_sheet_are_its_own() -> None:
 
 
 def test_walking_is_periodic_and_opposite_legs_are_half_a_stride_apart() -> None:
-    """The right leg does at step k what the left does eight steps later."""
+    """The right leg at step k equals the left one eight steps later."""
     for pose in ("walk", "run"):
         for step in range(posing.PHASES):
             assert posing.stance(pose, step) == posing.stance(pose, step + posing.PHASES)

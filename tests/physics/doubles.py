@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from gen_data.core.asset_types import ConvexParts, Joint, RobotModel
-from gen_data.core.errors import AssetError
+from gen_data.core.errors import AssetError, Rejection
 from gen_data.core.scene import Body, ObjectGroup, Scene, SupportSurface
 from gen_data.core.se3 import SE3
+from gen_data.physics.engine import Engine
 from tests.physics.panda import mesh_vertices, panda
 
 TABLE_TOP_Z_M = 0.75
@@ -154,6 +155,20 @@ def table_scene(*bodies: Body, placement: str = "drop", walled: bool = False) ->
     return Scene("test", bodies=furniture + things, surfaces=(surface,), groups=(group,))
 
 
+def accepted(engine: Engine, scene: Scene) -> Scene:
+    """The scene at rest; physics must accept it."""
+    outcome = engine.settle(scene)
+    assert outcome.rejection is None, outcome.rejection
+    return outcome.scene
+
+
+def refusal(engine: Engine, scene: Scene) -> Rejection:
+    """Reason and remedy; physics must refuse the scene."""
+    outcome = engine.settle(scene)
+    assert outcome.rejection is not None
+    return outcome.rejection
+
+
 def thing(
     name: str, asset: str, x: float = 0.0, y: float = 0.0, above_m: float = 0.2, **more: Any
 ) -> Body:
@@ -180,7 +195,7 @@ def world_vertices(body: Body) -> np.ndarray:
 
 
 def dropped_clutter(seed: int, count: int = 10) -> Scene:
-    """Household things in any orientation, each 2 to 10 cm above the one before."""
+    """Household objects in any orientation, each 2 to 10 cm above the one before."""
     rng = np.random.Generator(np.random.Philox(key=seed))
     half = np.array(TABLE_SIZE_M) / 2
     bodies, top = [], 0.0

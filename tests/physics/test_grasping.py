@@ -1,19 +1,15 @@
-"""Fingers of several links close on what is between them."""
+"""Fingers of several links close on the object between them."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from gen_data.core.asset_types import ConvexParts, Gripper, Joint, RobotModel
 from gen_data.core.se3 import SE3
-from gen_data.physics import PhysicsConfig
 from gen_data.physics.collision_shapes import collision_shape
 from gen_data.physics.manipulation.grasping import Hand
 from gen_data.physics.manipulation.joint_trajectories import Leg, limit_speed, sample_positions
-from gen_data.physics.open_world import open_world
-from gen_data.physics.physics_config import EngineName
 from gen_data.physics.world import World
 from tests.physics.doubles import box, cylinder
 
@@ -73,14 +69,12 @@ THINGS = {
 
 
 @pytest.fixture
-def world(engine_name: EngineName) -> Iterator[World]:
-    world = open_world(PhysicsConfig(engine=engine_name))
-    world.reset()
+def world(world: World) -> World:
+    """The parts of a hand and objects, apart from each other."""
     for name, parts in (*COLLISIONS.items(), *THINGS.items()):
         mass_kg = 0.1 if name in THINGS else 0.0
         world.add(name, collision_shape(ConvexParts(tuple(parts))), SE3((9, 0, 0)), mass_kg=mass_kg)
-    yield world
-    world.close()
+    return world
 
 
 def hand(world: World) -> Hand:

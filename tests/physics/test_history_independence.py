@@ -14,8 +14,8 @@ from gen_data.core.serialization import canonical_json
 from gen_data.physics import PhysicsConfig, open_engine
 from gen_data.physics.collision_shapes import collision_shape
 from gen_data.physics.engine import Engine
-from gen_data.physics.open_world import open_world
 from gen_data.physics.physics_config import EngineName
+from gen_data.physics.world import World
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, box, dropped_clutter, table_scene, thing
 from tests.physics.panda import HOME
 
@@ -58,7 +58,7 @@ def test_a_scene_settles_the_same_whatever_was_settled_before(
 
 @pytest.mark.slow
 def test_a_scene_settles_the_same_in_another_process(engine_name: EngineName) -> None:
-    """Spawned, so that nothing is inherited; after other work in this one."""
+    """Spawned: nothing is inherited; after other work in this one."""
     with open_engine(Solids(), PhysicsConfig(engine=engine_name)) as engine:
         engine.settle(dropped_clutter(1))
         here = digest(engine, with_arm(dropped_clutter(5)))
@@ -68,12 +68,11 @@ def test_a_scene_settles_the_same_in_another_process(engine_name: EngineName) ->
     assert here == there
 
 
-def test_bodies_that_once_ignored_each_other_meet_again(engine_name: EngineName) -> None:
+def test_bodies_that_once_ignored_each_other_meet_again(world: World) -> None:
     """Pairs that may pass through each other are forgotten with the world they were in."""
     floor, cube = (
         collision_shape(ConvexParts((box(*size),))) for size in ((1, 1, 0.1), (0.1, 0.1, 0.1))
     )
-    world = open_world(PhysicsConfig(engine=engine_name))
     heights = []
 
     for passes_through in (True, False):
@@ -84,7 +83,6 @@ def test_bodies_that_once_ignored_each_other_meet_again(engine_name: EngineName)
             world.ignore("floor", ["cube"])
         world.step(120)
         heights.append(world.pose("cube").translation_m[2])
-    world.close()
 
     assert heights[0] < -0.5
     assert heights[1] == pytest.approx(0.05, abs=0.0005)

@@ -63,8 +63,8 @@ def test_the_solution_next_to_home_comes_first() -> None:
 def levelled_arm() -> RobotModel:
     """Two arms of 0.5 m in a plane, and a hand that the linkage keeps level.
 
-    As in a palletizer: ``q_hand = -q_shoulder - q_elbow`` cannot be said by one mimic, so that the
-    elbow mimics the shoulder, ``-2 q + 0.2``, and the hand the elbow, ``0.5 q_elbow - 0.1``: the
+    As in a palletizer: ``q_hand = -q_shoulder - q_elbow`` is not one mimic, hence the elbow
+    mimics the shoulder, ``-2 q + 0.2``, and the hand the elbow, ``0.5 q_elbow - 0.1``: the
     hand is at ``-q``.
     """
 

@@ -1,4 +1,4 @@
-"""Forward kinematics, and what is derived from it."""
+"""Forward kinematics and its derived quantities."""
 
 import math
 from collections.abc import Iterator
@@ -98,7 +98,7 @@ def test_hand_flange_and_last_link_move_as_one_and_fingers_do_not() -> None:
 
 
 def test_positions_are_rounded_to_six_decimals_without_negative_zero() -> None:
-    """What is written to files is what was simulated."""
+    """Files contain the simulated positions."""
     rounded = kinematics.round_positions((math.pi, -1e-9))
 
     assert rounded == (3.141593, 0.0)

@@ -1,4 +1,4 @@
-"""What a user may write under ``physics:``."""
+"""Values that a user may write under ``physics:``."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Scenes that find no layout: the message names the best attempt, and what stood in its way."""
+"""Scenes that find no layout: the message names the best attempt and its obstacles."""
 
 import pickle
 

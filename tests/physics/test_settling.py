@@ -1,4 +1,4 @@
-"""Where things come to rest."""
+"""Places where objects come to rest."""
 
 import math
 from dataclasses import replace
@@ -15,19 +15,15 @@ from tests.physics.doubles import (
     HOUSEHOLD,
     TABLE_TOP_Z_M,
     Solids,
+    accepted,
     dropped_clutter,
+    refusal,
     table_scene,
     thing,
     world_vertices,
 )
 
 HALF_A_MM = 0.0005
-
-
-def settled(engine: Engine, scene: Scene) -> Scene:
-    outcome = engine.settle(scene)
-    assert outcome.rejection is None, outcome.rejection
-    return outcome.scene
 
 
 def lowest_m(body: Body) -> float:
@@ -42,7 +38,7 @@ def tilt_rad(body: Body) -> float:
 
 def test_a_dropped_box_rests_at_half_its_height_above_the_table(engine: Engine) -> None:
     """A cube of 10 cm: its centre is 5 cm above the top, within half a millimetre."""
-    scene = settled(engine, table_scene(thing("cube", "box 0.1 0.1 0.1", x=0.2)))
+    scene = accepted(engine, table_scene(thing("cube", "box 0.1 0.1 0.1", x=0.2)))
 
     x, y, z = scene.body("cube").T_world_body.translation_m
     assert z == pytest.approx(TABLE_TOP_Z_M + 0.05, abs=HALF_A_MM)
@@ -55,7 +51,7 @@ def test_nothing_floats_above_or_sinks_into_its_support(
     engine: Engine, asset: str, scale: float
 ) -> None:
     """The lowest vertex of whatever came to rest alone is at the table's height."""
-    scene = settled(engine, table_scene(thing("it", asset, scale=scale)))
+    scene = accepted(engine, table_scene(thing("it", asset, scale=scale)))
 
     assert lowest_m(scene.body("it")) == pytest.approx(TABLE_TOP_Z_M, abs=HALF_A_MM)
 
@@ -66,7 +62,7 @@ def test_what_rests_on_an_edge_before_tipping_over_lies_flat_afterwards(engine: 
     book = thing("book", "box 0.15 0.22 0.025")
     book = replace(book, T_world_body=SE3(book.T_world_body.translation_m, turn))
 
-    assert tilt_rad(settled(engine, table_scene(book)).body("book")) < math.radians(0.5)
+    assert tilt_rad(accepted(engine, table_scene(book)).body("book")) < math.radians(0.5)
 
 
 def test_a_cone_on_its_tip_falls_over(engine: Engine) -> None:
@@ -75,7 +71,7 @@ def test_a_cone_on_its_tip_falls_over(engine: Engine) -> None:
     cone = thing("cone", "cone 0.04 0.12")
     cone = replace(cone, T_world_body=SE3(cone.T_world_body.translation_m, upside_down))
 
-    scene = settled(engine, table_scene(cone))
+    scene = accepted(engine, table_scene(cone))
 
     assert math.radians(45) < tilt_rad(scene.body("cone")) < math.radians(135)
 
@@ -84,7 +80,7 @@ def test_a_stack_of_three_boxes_stays_a_stack(engine: Engine) -> None:
     """Centres one above another at half, one and a half and two and a half edges."""
     boxes = [thing(f"b{k}", "box 0.08 0.08 0.08", above_m=0.041 + 0.082 * k) for k in range(3)]
 
-    scene = settled(engine, table_scene(*boxes, placement="stack"))
+    scene = accepted(engine, table_scene(*boxes, placement="stack"))
 
     for k in range(3):
         expected = (0.0, 0.0, TABLE_TOP_Z_M + 0.04 + 0.08 * k)
@@ -100,7 +96,7 @@ def test_nothing_leans_on_a_wall_that_is_not_there(engine: Engine) -> None:
     turn = (math.cos(half), 0.0, math.sin(half), 0.0)
     board = replace(board, T_world_body=SE3(board.T_world_body.translation_m, turn))
 
-    scene = settled(engine, table_scene(board))
+    scene = accepted(engine, table_scene(board))
 
     assert tilt_rad(scene.body("board")) == pytest.approx(math.pi / 2, abs=math.radians(0.5))
     assert lowest_m(scene.body("board")) == pytest.approx(TABLE_TOP_Z_M, abs=HALF_A_MM)
@@ -108,12 +104,11 @@ def test_nothing_leans_on_a_wall_that_is_not_there(engine: Engine) -> None:
 
 def test_a_body_dropped_beside_the_table_is_refused_as_fallen_off(engine: Engine) -> None:
     """The floor catches it, but its group belongs on the table."""
-    outcome = engine.settle(table_scene(thing("cup", "mug 0.04 0.1", x=0.9)))
+    found = refusal(engine, table_scene(thing("cup", "mug 0.04 0.1", x=0.9)))
 
-    assert outcome.rejection is not None
-    assert outcome.rejection.reason == "object fell off"
-    assert "things" in outcome.rejection.remedy
-    assert "count" in outcome.rejection.remedy
+    assert found.reason == "object fell off"
+    assert "things" in found.remedy
+    assert "count" in found.remedy
 
 
 def ball_on_a_slope() -> Scene:
@@ -125,8 +120,8 @@ def ball_on_a_slope() -> Scene:
 
 
 def test_guard_walls_stop_what_would_roll_off(engine: Engine) -> None:
-    """The ball comes to rest on the table beside the wall, and stays when the wall is gone."""
-    scene = settled(engine, ball_on_a_slope())
+    """The ball comes to rest on the table at the wall, and stays when the wall is gone."""
+    scene = accepted(engine, ball_on_a_slope())
 
     assert 0.5 < scene.body("ball").T_world_body.translation_m[0] < 0.6
     # The ball has faces, on which its centre is lower than its radius.
@@ -136,11 +131,10 @@ def test_guard_walls_stop_what_would_roll_off(engine: Engine) -> None:
 def test_without_guard_walls_what_rolls_off_is_refused(engine_name: EngineName) -> None:
     """The ball leaves the table; the remedy is named."""
     with Engine(Solids(), PhysicsConfig(engine=engine_name, guard_walls=False)) as engine:
-        outcome = engine.settle(ball_on_a_slope())
+        found = refusal(engine, ball_on_a_slope())
 
-    assert outcome.rejection is not None
-    assert outcome.rejection.reason == "object fell off"
-    assert "physics.guard_walls" in outcome.rejection.remedy
+    assert found.reason == "object fell off"
+    assert "physics.guard_walls" in found.remedy
 
 
 def test_too_many_objects_for_a_bin_are_refused(engine: Engine) -> None:
@@ -150,10 +144,9 @@ def test_too_many_objects_for_a_bin_are_refused(engine: Engine) -> None:
         for k in range(16)
     ]
 
-    outcome = engine.settle(bin_scene((0.14, 0.14, 0.1), cubes))
+    found = refusal(engine, bin_scene((0.14, 0.14, 0.1), cubes))
 
-    assert outcome.rejection is not None
-    assert outcome.rejection.reason in {"object fell off", "objects interpenetrate"}
+    assert found.reason in {"object fell off", "objects interpenetrate"}
 
 
 def test_a_few_objects_in_a_bin_stay_inside(engine: Engine) -> None:
@@ -163,7 +156,7 @@ def test_a_few_objects_in_a_bin_stay_inside(engine: Engine) -> None:
         for k in range(6)
     ]
 
-    scene = settled(engine, bin_scene((0.3, 0.2, 0.12), balls))
+    scene = accepted(engine, bin_scene((0.3, 0.2, 0.12), balls))
 
     for k in range(6):
         x, y, z = scene.body(f"c{k}").T_world_body.translation_m
@@ -189,7 +182,7 @@ def bin_scene(size_m: tuple[float, float, float], bodies: list[Body]) -> Scene:
 def test_bodies_that_start_inside_one_another_are_put_apart(engine: Engine) -> None:
     """Two cubes at the same place come to rest without overlap."""
     one = thing("one", "box 0.06 0.06 0.06", above_m=0.03)
-    scene = settled(engine, table_scene(one, replace(one, name="two")))
+    scene = accepted(engine, table_scene(one, replace(one, name="two")))
 
     a, b = (np.array(scene.body(n).T_world_body.translation_m) for n in ("one", "two"))
     assert np.abs(a - b).max() > 0.06 - 0.001
@@ -215,11 +208,10 @@ def test_bodies_that_cannot_be_parted_are_refused(engine: Engine) -> None:
 def test_what_still_moves_when_time_is_up_is_refused(engine_name: EngineName) -> None:
     """A twentieth of a second is too short for a fall; the remedy names the time."""
     with Engine(Solids(), PhysicsConfig(engine=engine_name, settle_time_s_max=0.05)) as engine:
-        outcome = engine.settle(table_scene(thing("cup", "mug 0.04 0.1", above_m=0.4)))
+        found = refusal(engine, table_scene(thing("cup", "mug 0.04 0.1", above_m=0.4)))
 
-    assert outcome.rejection is not None
-    assert outcome.rejection.reason == "still moving after 0.05 s"
-    assert "physics.settle_time_s_max" in outcome.rejection.remedy
+    assert found.reason == "still moving after 0.05 s"
+    assert "physics.settle_time_s_max" in found.remedy
 
 
 def test_objects_on_neighbouring_tables_do_not_meet_each_others_walls(engine: Engine) -> None:
@@ -239,7 +231,7 @@ def test_objects_on_neighbouring_tables_do_not_meet_each_others_walls(engine: En
         groups=(*scene.groups, group),
     )
 
-    x, y, z = settled(engine, scene).body("far").T_world_body.translation_m
+    x, y, z = accepted(engine, scene).body("far").T_world_body.translation_m
 
     assert (x, y) == pytest.approx((0.63, 0.0), abs=0.001)
     assert z == pytest.approx(TABLE_TOP_Z_M + 0.025, abs=HALF_A_MM)
@@ -247,7 +239,7 @@ def test_objects_on_neighbouring_tables_do_not_meet_each_others_walls(engine: En
 
 def test_a_crowd_at_one_place_is_spread_out(engine: Engine) -> None:
     """Four cans that start inside one another are lifted free before they fall."""
-    scene = settled(
+    scene = accepted(
         engine, table_scene(*[thing(f"can{k}", "cylinder 0.033 0.12", 0.01 * k) for k in range(4)])
     )
 
@@ -273,7 +265,7 @@ def test_only_dynamic_bodies_move(engine: Engine) -> None:
     scene = table_scene(thing("cube", "box 0.1 0.1 0.1"))
     scene = replace(scene, bodies=(*scene.bodies, ghost))
 
-    after = settled(engine, scene)
+    after = accepted(engine, scene)
 
     assert [body.name for body in after.bodies] == [body.name for body in scene.bodies]
     for name in ("floor", "table", "ghost"):
@@ -282,7 +274,7 @@ def test_only_dynamic_bodies_move(engine: Engine) -> None:
 
 def test_poses_leave_physics_on_the_decimal_grid(engine: Engine) -> None:
     """Rounding again changes nothing."""
-    scene = settled(engine, dropped_clutter(3, count=4))
+    scene = accepted(engine, dropped_clutter(3, count=4))
 
     for body in scene.bodies:
         if body.motion == "dynamic":
@@ -290,7 +282,7 @@ def test_poses_leave_physics_on_the_decimal_grid(engine: Engine) -> None:
 
 
 def test_clutter_on_a_table_is_accepted_nearly_always(engine: Engine) -> None:
-    """Ten household things in any orientation, each dropped from above the one before."""
+    """Ten household objects in any orientation, each dropped from above the one before."""
     outcomes = [engine.settle(dropped_clutter(seed)) for seed in range(20)]
 
     assert sum(outcome.rejection is None for outcome in outcomes) >= 18

@@ -80,7 +80,7 @@ def test_a_thin_sheet_never_turns_inside_out() -> None:
 
 
 def test_a_flat_part_neither_weighs_nor_fails() -> None:
-    """A square without thickness beside a cube: the cube alone has mass."""
+    """A square without thickness and a cube: the cube alone has mass."""
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 
     shape = collision_shape(ConvexParts((square, box(0.1, 0.1, 0.1, at=(5, 0, 0)))))
@@ -96,7 +96,7 @@ def test_points_inside_a_hull_are_left_out() -> None:
 
 
 def test_any_scale_is_near_a_step() -> None:
-    """Within 2.5 percent, so that the shell is missed by at most 25 micrometres."""
+    """Within 2.5 percent, hence the shell is missed by at most 25 micrometres."""
     for scale in np.geomspace(0.01, 100.0, 997):
         assert 1.05 ** scale_step(float(scale)) == pytest.approx(scale, rel=0.0251)
     assert scale_step(1.0) == 0

@@ -8,11 +8,8 @@ import pytest
 from gen_data.core.asset_types import SuctionCup
 from gen_data.core.scene import BodyJoint
 from gen_data.core.se3 import SE3
-from gen_data.physics import PhysicsConfig
 from gen_data.physics.collision_shapes import collision_shape
 from gen_data.physics.manipulation.suction import is_sealed, needed_force_n
-from gen_data.physics.open_world import open_world
-from gen_data.physics.physics_config import EngineName
 from gen_data.physics.world import World, joint_position
 from tests.physics.doubles import _parts
 
@@ -20,17 +17,14 @@ CUP = SuctionCup(0.015, 40.0)
 DOWN = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
 """A hand that looks down."""
 TOP_M = 1.025
-"""Height of the top of the block in ``world_with_block``."""
+"""Height of the top of the block in ``put_block``."""
 
 
-def world_with_block(engine_name: EngineName) -> World:
+def put_block(world: World) -> None:
     """A table of which the top is at 1 m, and a block of 0.1 x 0.1 x 0.025 m and 2 kg on it."""
-    world = open_world(PhysicsConfig(engine=engine_name))
-    world.reset()
     world.add("table", collision_shape(_parts("box 1 1 0.1")), SE3((0.0, 0.0, 0.95)))
     block = collision_shape(_parts("box 0.1 0.1 0.025"))
     world.add("block", block, SE3((0.0, 0.0, 1.0125)), mass_kg=2.0)
-    return world
 
 
 def turned(angle_deg: float) -> SE3:
@@ -39,39 +33,37 @@ def turned(angle_deg: float) -> SE3:
     return SE3(quaternion_wxyz=(math.cos(half), math.sin(half), 0.0, 0.0))
 
 
-def test_forces_of_contacts_add_up_to_the_weight(engine_name: EngineName) -> None:
+def test_forces_of_contacts_add_up_to_the_weight(world: World) -> None:
     """2 kg at rest: m g = 19.62 N, at points under the block, at the height of the table."""
-    world = world_with_block(engine_name)
+    put_block(world)
     world.step(240)
     contacts = [c for c in world.contacts() if {c.one, c.other} == {"block", "table"}]
-    world.close()
     assert math.fsum(c.force_n for c in contacts) == pytest.approx(2.0 * 9.81, rel=0.01)
     for contact in contacts:
         assert np.abs(contact.point_m[:2]).max() < 0.0515
         assert contact.point_m[2] == pytest.approx(1.0, abs=0.002)
 
 
-def test_asking_for_contacts_changes_nothing(engine_name: EngineName) -> None:
+def test_asking_for_contacts_changes_nothing(world: World) -> None:
     """A block that slides and is asked about at every step ends where another one does."""
     poses = []
     for asked in (False, True):
-        world = world_with_block(engine_name)
+        world.reset()
+        put_block(world)
         world.place("block", SE3((0.0, 0.0, 1.03)) @ turned(8.0))
         for _ in range(60):
             world.step(1)
             if asked:
                 world.contacts()
         poses.append(world.pose("block"))
-        world.close()
     assert poses[0] == poses[1]
 
 
-def test_rays_hit_a_block_where_its_face_is(engine_name: EngineName) -> None:
-    """From 0.5 m above the top; beside the block; and from its inside."""
-    world = world_with_block(engine_name)
+def test_rays_hit_a_block_where_its_face_is(world: World) -> None:
+    """From 0.5 m above the top; next to the block; and from its inside."""
+    put_block(world)
     origins = np.array([[0.04, -0.04, TOP_M + 0.5], [0.06, 0.0, TOP_M + 0.5], [0.0, 0.0, 1.01]])
     found = world.hits_m("block", origins, np.array([0.0, 0.0, -1.0]))
-    world.close()
     assert found == pytest.approx([0.5, np.inf, 0.0], abs=1e-9)
 
 
@@ -88,13 +80,12 @@ def test_rays_hit_a_block_where_its_face_is(engine_name: EngineName) -> None:
     ],
 )
 def test_a_cup_seals_where_its_whole_rim_lies_on_a_face(
-    engine_name: EngineName, x_m: float, gap_m: float, tilt_deg: float, seals: bool
+    world: World, x_m: float, gap_m: float, tilt_deg: float, seals: bool
 ) -> None:
     """Beyond an edge, too far from the face, or too oblique, it does not."""
-    world = world_with_block(engine_name)
+    put_block(world)
     cup_at = SE3((x_m, 0.0, TOP_M + gap_m)) @ turned(tilt_deg) @ DOWN
     assert is_sealed(world, "block", cup_at, CUP) == seals
-    world.close()
 
 
 def test_a_cup_bears_weight_and_acceleration() -> None:
@@ -105,14 +96,12 @@ def test_a_cup_bears_weight_and_acceleration() -> None:
     )
 
 
-def test_a_thing_on_a_moving_hinge_turns_by_contact_only(engine_name: EngineName) -> None:
+def test_a_thing_on_a_moving_hinge_turns_by_contact_only(world: World) -> None:
     """A rod that friction holds 40 deg aslant is pressed down with its end on the table.
 
     The end is 0.1 m from the hinge, which goes down by 2 cm after it has come to the table: the
     angle becomes acos((0.1 cos 40 deg - 0.02) / 0.1).
     """
-    world = open_world(PhysicsConfig(engine=engine_name))
-    world.reset()
     world.add("table", collision_shape(_parts("box 1 1 0.1")), SE3((0.0, 0.0, 0.95)))
     rod = collision_shape(_parts("box 0.002 0.02 0.2"))
     start = math.radians(40.0)
@@ -134,7 +123,6 @@ def test_a_thing_on_a_moving_hinge_turns_by_contact_only(engine_name: EngineName
     world.unhinge("rod")
     world.step(240)
     fallen = world.pose("rod").translation_m[2]
-    world.close()
     needed = math.degrees(math.acos((0.1 * math.cos(start) - 0.02) / 0.1))
     assert math.degrees(angle) == pytest.approx(needed, abs=1.5)
     assert pressed == pytest.approx(1.0 + hinge_m - 0.02, abs=1e-6)

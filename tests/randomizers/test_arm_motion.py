@@ -51,7 +51,7 @@ def test_pick_and_place_takes_what_fits_and_puts_it_on_the_table() -> None:
 
 
 def test_what_the_arm_holds_is_put_down_first() -> None:
-    """Then the next thing is taken, and it is another one."""
+    """Then the next object is taken, and it is another one."""
     hold = ArmGoal("hold", pose_candidates=(SE3(),), grasped_object="clutter/0")
 
     way = drawn(scene("brick", "brick", goal=hold), count=2)

@@ -1,4 +1,4 @@
-"""Tasks of arms: the table, and what is drawn from it."""
+"""Tasks of arms: the table, and draws from it."""
 
 import json
 from collections import Counter
@@ -45,7 +45,7 @@ def test_the_table_has_tasks_of_many_kinds() -> None:
         "reach", "move", "grasp", "place", "grip"}  # fmt: skip
     assert {c.measure for t in table.values() for c in t.success} == {
         "distance", "offset", "height", "gap", "tilt", "travel"}  # fmt: skip
-    # The hand is no body of the scene.
+    # The hand does not belong to the bodies of the scene.
     assert any(c.body == HAND for c in table["reach"].success)
 
 
@@ -78,7 +78,7 @@ BOXES = replace(SCENE, groups=(replace(GROUP, assets=("box", "bin")),))
      ConfigError, r"'suck' needs suction, but arm 'arm' .* has fingers; .*panda_suction"),
 ])  # fmt: skip
 def test_a_task_that_cannot_be_is_refused_by_its_field(make: Any, error: Any, message: str) -> None:
-    """Unknown things, shares, tasks and groups; suction with fingers, by a robot that would do."""
+    """Unknown things, shares, tasks and groups; suction with fingers, by a robot that can."""
     assert Task.model_validate_json(MINIMAL % "it")
     with pytest.raises(error, match=message):
         make()
@@ -163,7 +163,7 @@ def test_tasks_without_a_grasp_never_fail_on_purpose() -> None:
 
 
 def test_a_success_cannot_be_labelled_as_a_failure() -> None:
-    """Nor the reverse: what failed may have a reason."""
+    """Nor the reverse: a failure may have a reason."""
     with pytest.raises(ValueError, match="succeeded has no failure, but 'slip'"):
         Episode(True, "slip")
     assert Episode(False, "slip").failure == "slip"

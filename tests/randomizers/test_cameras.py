@@ -1,4 +1,4 @@
-"""Where cameras are, what they look at, and through which lens."""
+"""Places, aims and lenses of cameras."""
 
 import math
 from dataclasses import replace
@@ -127,7 +127,7 @@ def test_lens_has_the_field_of_view_and_offset_that_were_asked_for() -> None:
 
 
 def test_exposure_is_fixed_within_its_range() -> None:
-    """Automatic before, a value of its own per camera after."""
+    """Automatic before, one value per camera after."""
     scene = Exposure(name="shutter", ev100=Uniform(5.0, 9.0))(SCENE, FakeAssets(), rng_of())
 
     assert SCENE.cameras[0].ev100 is None

@@ -86,7 +86,7 @@ def test_two_people_in_three_have_company_by_default(library: AssetLibrary) -> N
 
 
 def test_nobody_stands_in_a_wall_or_has_a_name_twice(library: AssetLibrary) -> None:
-    """Places beside a dense row of people are taken: companies stay small."""
+    """Places next to a dense row of people are taken: companies stay small."""
     group = ObjectGroup("people", (), ASSETS, 0, "along", lanes=("sidewalk",))
     row = [Member(ASSETS[k % 4], SE3((0.0, 0.7 * k, 0.0))) for k in range(20)]
     dense = add_members(Scene("test", groups=(group,)), group, row, library)

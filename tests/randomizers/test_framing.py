@@ -1,4 +1,4 @@
-"""Cameras that frame a thing: its size and place in the image, for any lens.
+"""Cameras that frame an object: its size and place in the image, for any lens.
 
 Expected images are projected by OpenCV, and by hand for panoramas.
 """
@@ -153,7 +153,7 @@ def test_lenses_that_focus_on_nothing_nearer_keep_their_distance() -> None:
 
 @pytest.mark.parametrize("roll_deg", [-8.0, 0.0, 5.0])
 def test_camera_stays_level_beside_the_thing(roll_deg: float) -> None:
-    """Its X axis leans by the roll alone, wherever in the image the thing is."""
+    """Its X axis leans by the roll alone, wherever in the image the object is."""
     thing = Thing((0.0, 0.0, 0.0), np.array([[-0.1, 0.0, -0.1], [0.1, 0.0, 0.1]]))
     for at_px in ((320.0, 240.0), (120.0, 60.0), (600.0, 400.0)):
         framing = Framing(0.2, (0.0, -0.8, 0.6), at_px, math.radians(roll_deg))
@@ -208,7 +208,7 @@ def test_drawn_shares_are_distributed_as_declared_whatever_is_in_the_way() -> No
 
 
 def test_camera_keeps_its_elevation_room_and_clearance() -> None:
-    """Seen from the thing's centre; never in a body or beyond a wall."""
+    """Seen from the object's centre; never in a body or beyond a wall."""
     for number in range(40):
         camera = framed(number=number, fills=LogUniform(0.04, 0.9),
                         elevation_deg=Uniform(20.0, 50.0), clearance_m=0.08)  # fmt: skip
@@ -228,7 +228,7 @@ def test_camera_keeps_its_elevation_room_and_clearance() -> None:
 
 @pytest.mark.parametrize(("off_center", "gap"), [(0.0, 0.5), (1.0, 0.0), (-0.5, 0.25)])
 def test_thing_lies_as_far_from_the_middle_as_was_drawn(off_center: float, gap: float) -> None:
-    """A square of the thing's size has this share of the free space on its nearer side."""
+    """A square of the object's size has this share of the free space on its nearer side."""
     camera = framed(off_center=Constant(off_center))
     centers = [0.5 * (corners_m(b)[0] + corners_m(b)[7]) for b in SCENE.bodies[1:]]
     seen = LENSES["pinhole"].project(camera.T_world_camera.inverse().apply(np.array(centers)))
@@ -266,7 +266,7 @@ def test_aims_can_be_mixed_and_need_no_share() -> None:
 
 
 def test_small_shares_are_tried_only_where_the_drawn_one_has_no_place() -> None:
-    """A share of .9 or .2: with 0.4 m around the things, the camera has a place at .2 only."""
+    """A share of .9 or .2: with 0.4 m around the objects, the camera has a place at .2 only."""
     either = Choice({0.9: 1.0, 0.2: 1e-9})
     sides = {}
     for clearance_m in (0.0, 0.4):

@@ -1,4 +1,4 @@
-"""Objects held in a hand: contact from two sides, no flesh inside, room around, what shows."""
+"""Objects held in a hand: contact from two sides, no flesh inside, room, and visible sides."""
 
 import math
 from dataclasses import replace
@@ -39,7 +39,7 @@ def table(*things: str) -> Scene:
 
 
 def held_up(thing: str, library: Library, number: int = 0, **fields: object) -> tuple[Body, Body]:
-    """The thing and the hand."""
+    """The object and the hand."""
     grip = HandHeld(name="hands", **fields)  # type: ignore[arg-type]
     thing_body, hand = grip(table(thing), library, rng_of(thing, number)).bodies
     return thing_body, hand

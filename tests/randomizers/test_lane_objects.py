@@ -1,4 +1,4 @@
-"""Things along lanes, and cameras that ride there."""
+"""Objects along lanes, and cameras that ride there."""
 
 import math
 from dataclasses import replace
@@ -127,7 +127,7 @@ TINY = Lane("a", "driving", ((0.0, 0.0, 0.0), (0.1, 0.1, 0.0)), 0.1)
      ConfigError, r"randomizers\.dash\.towards: .*'peple'.*things"),
     (lambda: ridden(street(), lanes=("sidewalk",)),
      ConfigError, "no lane of kind sidewalk; there is driving"),
-], ids=["too many scattered things", "an impossible density", "more than a lane can hold",
+], ids=["too many scattered objects", "an impossible density", "more than a lane can hold",
         "fading without an ego vehicle", "an unknown group", "no such lane"])  # fmt: skip
 def test_what_cannot_be_drawn_is_refused_by_name(make: Any, error: Any, message: str) -> None:
     with pytest.raises(error, match=message):
@@ -193,7 +193,7 @@ def test_views_towards_a_group_are_as_frequent_as_drawn() -> None:
 
 
 def test_a_camera_is_anywhere_where_no_member_has_a_place_before_it() -> None:
-    """The only brick stands beside the start of a lane of 40 m, and no camera is 60 m before it."""
+    """The only brick stands at the start of a lane of 40 m, and no camera is 60 m before it."""
     assert ridden(with_brick(1.0), towards="things", towards_m=Constant(60.0)) != SE3()
 
 

@@ -1,4 +1,4 @@
-"""Colours, finishes, textures and the background; and what objects weigh."""
+"""Colours, finishes, textures and the background; and weights of objects."""
 
 import json
 from collections.abc import Callable
@@ -156,7 +156,7 @@ def test_finishes_stay_in_their_ranges() -> None:
 
 
 def test_coats_and_glass_come_only_where_they_are_asked_for() -> None:
-    """Shares within four sigma; clear objects are no metal; the other draws stay as they were."""
+    """Shares within four sigma; clear objects are not metal; the other draws stay as they were."""
     scene = scene_with(*["brick"] * 400)
     plain = Materials(name="m", probability=ALWAYS)
     made = Materials(name="m", probability=ALWAYS, coated=Probability(0.3), clear=HALF,
@@ -232,7 +232,7 @@ def test_a_probability_is_a_number_or_a_flag(kind: str, written: str, mean: floa
     ("yes", "expected a probability in [0, 1], true or false, got 'yes' (did you mean true?)"),
 ])  # fmt: skip
 def test_an_impossible_probability_is_told_with_its_place(written: str, fact: str) -> None:
-    """The column is that of the value."""
+    """At the value's column."""
     problems = Problems()
     validate(parse_yaml(f"{{name: r, probability: {written}}}", "x.yaml"), Colors, problems)
 
@@ -282,7 +282,7 @@ def test_weights_and_friction_change_for_what_falls_only() -> None:
 
 
 def test_prints_replaces_printed_images_of_named_categories_only() -> None:
-    """The label of a bottle; what is not printed, and other categories, stay as they are."""
+    """The label of a bottle; plain materials and other categories stay as they are."""
     scene = scene_with("brick", "bottle")
     category = FakeAssets().get("bottle").category
     own = FakeAssets().materials("bottle")

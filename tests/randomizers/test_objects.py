@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gen_data.config.distributions import Constant, Count, Flag, Sequence, Uniform, UniformInteger
+from gen_data.config.distributions import Constant, Count, Flag, Uniform, UniformInteger
 from gen_data.core.errors import ConfigError, LayoutRejected
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import SE3, Vec3
@@ -41,42 +41,28 @@ def bodies_of(scene: Scene) -> list[Body]:
 
 
 @pytest.mark.parametrize("placement", PLACEMENTS)
-@pytest.mark.parametrize("upright", [True, False])
-def test_objects_start_clear_of_each_other(placement: str, upright: bool) -> None:
-    """No two boxes overlap, whatever the placement and however they are turned."""
+@pytest.mark.parametrize(
+    ("count", "upright", "keep_out"), [(9, True, ()), (9, False, ()), (6, None, KEEP_OUT)]
+)
+def test_objects_start_apart_over_their_surface_and_where_nothing_keeps_them_out(
+    placement: str, count: int, upright: bool | None, keep_out: tuple[Vec3, ...]
+) -> None:
+    """By the boxes, however they are turned: corners, edges seen from above, and overlaps."""
+    given = None if upright is None else Constant(upright)
     for scene_index in range(12):
-        scene = surface_scene((1.4, 1.0), placement=placement)
-        scene = drawn(scene, Constant(9), scene_index, upright=Constant(upright))
+        scene = surface_scene((1.4, 1.0), placement=placement, keep_out=keep_out)
+        scene = drawn(scene, Constant(count), scene_index, upright=given)
+        bodies = bodies_of(scene)
+        corners = np.stack([corners_of(body) for body in bodies])
+        here = scene.surface("s0").T_world_surface.inverse().apply(corners.reshape(-1, 3))
+        along = np.linspace(0.0, 1.0, 9).reshape(9, 1, 1, 1, 1)
+        edges = along * corners[:, :, None, :2] + (1.0 - along) * corners[:, None, :, :2]
 
-        assert deepest_overlap_m(bodies_of(scene)) < 1e-6
-
-
-@pytest.mark.parametrize("placement", PLACEMENTS)
-def test_objects_start_over_their_surface(placement: str) -> None:
-    """Every corner of every box is over the rectangle, and none is below it."""
-    for scene_index in range(12):
-        scene = drawn(surface_scene((1.4, 1.0), placement=placement), Constant(8), scene_index)
-        surface = scene.surface("s0")
-        corners = np.concatenate([corners_of(body) for body in bodies_of(scene)])
-        here = surface.T_world_surface.inverse().apply(corners)
-
-        assert (np.abs(here[:, 0]) <= 0.7 + 1e-6).all()
-        assert (np.abs(here[:, 1]) <= 0.5 + 1e-6).all()
+        assert deepest_overlap_m(bodies) < 1e-6
+        assert (np.abs(here[:, :2]) <= np.array([0.7, 0.5]) + 1e-6).all()
         assert (here[:, 2] > 0.0).all()
-
-
-@pytest.mark.parametrize("placement", PLACEMENTS)
-def test_nothing_starts_where_it_is_kept_out(placement: str) -> None:
-    """No part of a box, seen from above, is in the disc around the arm's base."""
-    for scene_index in range(12):
-        scene = surface_scene((1.4, 1.0), placement=placement, keep_out=KEEP_OUT)
-        for body in bodies_of(drawn(scene, Constant(6), scene_index)):
-            corners = corners_of(body)[:, :2]
-            along = np.linspace(0.0, 1.0, 9).reshape(9, 1, 1, 1)
-            edges = along * corners[:, None] + (1.0 - along) * corners[None, :]
-            nearest_m = float(np.hypot(edges[..., 0], edges[..., 1]).min())
-
-            assert nearest_m > KEEP_OUT[0][2] - 1e-6
+        for x_m, y_m, radius_m in keep_out:
+            assert np.hypot(edges[..., 0] - x_m, edges[..., 1] - y_m).min() > radius_m - 1e-6
 
 
 def test_objects_in_a_row_touch() -> None:
@@ -103,7 +89,7 @@ def test_rows_under_a_board_stand_at_its_front() -> None:
         assert -0.25 <= front_m <= -0.25 + 0.15 * 0.5
 
 
-def test_piles_are_narrower_than_what_lies_apart() -> None:
+def test_piles_are_narrower_than_dropped_objects() -> None:
     """Median distance from the middle of all, 8 objects on 4 m x 4 m."""
     away: dict[str, list[float]] = {"pile": [], "drop": []}
     for placement, distances in away.items():
@@ -151,7 +137,7 @@ def test_dropped_objects_fall_a_few_centimetres_at_most_onto_a_bare_surface() ->
 
 
 def test_towers_are_of_stackable_things_only() -> None:
-    """Whatever stands on another thing, and what it stands on, is flat above and below."""
+    """Raised objects, and the ones below them, are flat above and below."""
     scene = surface_scene(placement="stack", assets=("bottle", "brick", "can?seed=0"))
     raised = 0
     for scene_index in range(8):
@@ -206,14 +192,6 @@ def test_counts_are_those_that_were_asked_for() -> None:
     seen = {len(bodies_of(drawn(surface_scene(), UniformInteger(2, 5), k))) for k in range(40)}
 
     assert seen == {2, 3, 4, 5}
-
-
-def test_sequence_of_counts_goes_by_scene_number() -> None:
-    """Scene k has the count of its turn, whichever scenes were made before."""
-    counts = Sequence((3, 0, 5))
-    seen = [len(bodies_of(drawn(surface_scene(), counts, k))) for k in (4, 0, 2, 1, 3)]
-
-    assert seen == [0, 3, 5, 0, 3]
 
 
 def test_categories_are_equally_likely_however_many_variants_they_have() -> None:
@@ -271,7 +249,7 @@ def test_instance_ids_are_the_smallest_that_are_free() -> None:
         assert scene.instances[:2] == others
 
 
-def test_objects_keep_clear_of_what_other_groups_have_put() -> None:
+def test_objects_keep_clear_of_other_groups() -> None:
     """A second group sees the first."""
     for scene_index in range(10):
         scene = drawn(surface_scene(), Constant(5), scene_index)

@@ -1,4 +1,4 @@
-"""Hands that hold things: contact without penetration, room for others, labels."""
+"""Hands that hold objects: contact without penetration, room for others, labels."""
 
 import math
 
@@ -22,7 +22,7 @@ HELD = ("can?seed=9", "jar?seed=18", "cup?seed=9", "mug?seed=27")
 
 
 def table(things: tuple[str, ...]) -> Scene:
-    """A table in a room, a group of hands and a group of things that they may hold."""
+    """A table in a room, a group of hands and a group of objects that they may hold."""
     surface = SupportSurface("table", "table", SE3((0.0, 0.0, TABLE_Z_M)), (1.2, 0.8), 1.5)
     hands = ObjectGroup("hands", ("table",), ("hand?seed=2", "hand?seed=9"), 0, "drop")
     others = ObjectGroup("clutter", ("table",), things, 4, "drop")

@@ -1,4 +1,4 @@
-"""Sensors beside their places on rigs."""
+"""Sensors off their places on rigs."""
 
 import math
 from dataclasses import replace

@@ -17,7 +17,7 @@ COUNT = 60
 
 
 def street(library: Library, rain_mm_h: float) -> Scene:
-    """People in all poses, beside a group that is no target."""
+    """People in all poses, and a group that is not a target."""
     assets = tuple(f"simple_person?pose={pose}&seed=1" for pose in POSES)
     group = ObjectGroup("people", (), assets, 0, "along", lanes=("sidewalk",))
     scene = Scene("test", groups=(group,), weather=Weather(rain_mm_h=rain_mm_h))

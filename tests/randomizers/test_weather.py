@@ -1,4 +1,4 @@
-"""Weather, time of day and street lights: what they put into a scene."""
+"""Weather, time of day and street lights: their parts of a scene."""
 
 import json
 import math

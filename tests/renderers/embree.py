@@ -1,4 +1,4 @@
-"""What cameras see by Embree, from the same bodies and rays."""
+"""Views of cameras by Embree, from the same bodies and rays."""
 
 import numpy as np
 
@@ -7,17 +7,21 @@ from gen_data.core.scene import Camera, Scene
 from tests.embree import RayCaster, placed
 
 
-def cast(scene: Scene, assets: AssetLibrary, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """z-depth [m] (inf = nothing) and instance id (0 = nothing) at every pixel centre.
-
-    Rays have z = 1 in the camera frame, so Embree's parameter, which counts in lengths of the
-    direction, is the z-depth.
-    """
-    caster = RayCaster(*(placed(body, assets) for body in scene.bodies))
+def pixel_ways(camera: Camera) -> np.ndarray:
+    """Directions through pixel centres in the world, [h, w, 3]; z = 1 in the camera frame."""
     k = camera.intrinsics
     v, u = np.mgrid[0 : k.height_px, 0 : k.width_px] + 0.5
     along = np.stack([(u - k.cx_px) / k.fx_px, (v - k.cy_px) / k.fy_px, np.ones_like(u)], axis=-1)
-    hits = caster.cast(camera.T_world_camera.translation_m, camera.T_world_camera.rotate(along))
+    return np.asarray(camera.T_world_camera.rotate(along))
+
+
+def cast(scene: Scene, assets: AssetLibrary, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """z-depth [m] (inf = nothing) and instance id (0 = nothing) at every pixel centre.
+
+    Embree's parameter, which counts in lengths of the direction, is the z-depth.
+    """
+    caster = RayCaster(*(placed(body, assets) for body in scene.bodies))
+    hits = caster.cast(camera.T_world_camera.translation_m, pixel_ways(camera))
     # The last id is for NOTHING.
     ids = np.array([*(body.instance_id for body in scene.bodies), 0], np.uint16)
     return hits.distance, ids[hits.mesh]
@@ -35,11 +39,8 @@ def cast_layers(
     materials = [assets.mesh(body.asset).materials[0] for body in scene.bodies]
     clear = np.array([*(m.transmission > 0 or m.opacity < 1 for m in materials), False])
     ids = np.array([*(body.instance_id for body in scene.bodies), 0], np.uint16)
-    k = camera.intrinsics
-    v, u = np.mgrid[0 : k.height_px, 0 : k.width_px] + 0.5
-    along = np.stack([(u - k.cx_px) / k.fx_px, (v - k.cy_px) / k.fy_px, np.ones_like(u)], axis=-1)
-    ways = camera.T_world_camera.rotate(along)
-    begin, going = np.zeros(u.shape), np.ones(u.shape, bool)
+    ways = pixel_ways(camera)
+    begin, going = np.zeros(ways.shape[:2]), np.ones(ways.shape[:2], bool)
     depths_m, numbers = [], []
     for _ in range(layers):
         starts = camera.T_world_camera.translation_m + begin[..., None] * ways

@@ -86,6 +86,19 @@ def _mesh(vertices, faces, normals, uvs, materials) -> asset_types.MeshData:  # 
     )
 
 
+def ground(material: asset_types.Material | None = None) -> "FakeLibrary":
+    """A plane of 20 m, matte by default, and a box of 1 m."""
+    return FakeLibrary({"plane": plane_mesh(20.0, (material or MATTE,)), "box": box_mesh()})
+
+
+def scattered_pose(rng: np.random.Generator, low_m: se3.Vec3, high_m: se3.Vec3) -> se3.SE3:
+    """Any rotation, at any place in a box."""
+    q = rng.normal(size=4)
+    w, x, y, z = (float(v) for v in q / np.linalg.norm(q))
+    place = tuple(float(v) for v in rng.uniform(low_m, high_m))
+    return se3.SE3(place, (w, x, y, z))
+
+
 def uniform_sky(height: int = 16) -> asset_types.Float32:
     return np.ones((height, 2 * height, 3), np.float32)
 

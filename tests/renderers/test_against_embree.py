@@ -14,7 +14,14 @@ from gen_data.core.se3 import SE3
 from gen_data.pipeline import Pipeline
 from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.embree import cast, near_edges
-from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, room_mesh, sphere_mesh
+from tests.renderers.fake_library import (
+    FakeLibrary,
+    box_mesh,
+    camera_at,
+    room_mesh,
+    scattered_pose,
+    sphere_mesh,
+)
 
 LABELS = frozenset({Channel.Z_DEPTH, Channel.INSTANCE})
 LIBRARY = FakeLibrary({
@@ -47,12 +54,10 @@ def random_scene(seed: int) -> tuple[Scene, Camera]:
     rng = np.random.default_rng(seed)
     bodies = [Body("room", "room"), Body("slab", "slab", SE3((0.0, 0.0, 0.7)), instance_id=1)]
     for k in range(20):
-        q = rng.normal(size=4)
-        w, x, y, z = (float(v) for v in q / np.linalg.norm(q))
-        place = tuple(float(v) for v in rng.uniform((-0.8, -0.6, 0.7), (0.8, 0.6, 1.2)))
+        pose = scattered_pose(rng, (-0.8, -0.6, 0.7), (0.8, 0.6, 1.2))
         asset = str(rng.choice(["box", "ball", "egg"]))
         scale = float(rng.uniform(0.4, 1.8))
-        bodies.append(Body(f"b{k}", asset, SE3(place, (w, x, y, z)), scale, instance_id=k + 2))
+        bodies.append(Body(f"b{k}", asset, pose, scale, instance_id=k + 2))
     eye = tuple(float(v) for v in rng.uniform((1.0, -1.5, 1.0), (2.0, 1.5, 2.2)))
     return Scene("random", tuple(bodies)), camera_at(eye, (0.0, 0.0, 0.8), (320, 240))
 

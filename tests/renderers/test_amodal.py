@@ -8,7 +8,13 @@ from gen_data.core.scene import Body, Camera, Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
-from tests.renderers.fake_library import FakeLibrary, box_mesh, forward_camera, sphere_mesh
+from tests.renderers.fake_library import (
+    FakeLibrary,
+    box_mesh,
+    forward_camera,
+    scattered_pose,
+    sphere_mesh,
+)
 
 MESHES = {"box": box_mesh(), "ball": sphere_mesh(0.5, rings=24)}
 WANTED = frozenset({Channel.INSTANCE, Channel.AMODAL})
@@ -69,11 +75,8 @@ def test_what_is_visible_of_an_instance_lies_in_its_silhouette(visibility: str) 
     camera = forward_camera((96, 72), focal_px=70.0)
     bodies = []
     for k in range(24):
-        q = rng.normal(size=4)
-        w, x, y, z = (float(v) for v in q / np.linalg.norm(q))
-        place = tuple(float(v) for v in rng.uniform((-1.5, -1.2, 1.5), (1.5, 1.2, 4.0)))
-        asset = ("box", "ball")[k % 2]
-        bodies.append(Body(f"b{k}", asset, SE3(place, (w, x, y, z)), 0.5, instance_id=k // 2 + 1))
+        pose = scattered_pose(rng, (-1.5, -1.2, 1.5), (1.5, 1.2, 4.0))
+        bodies.append(Body(f"b{k}", ("box", "ball")[k % 2], pose, 0.5, instance_id=k // 2 + 1))
 
     reading = rendered(scene_of(*bodies), camera, visibility)
 
@@ -86,18 +89,13 @@ def test_what_is_visible_of_an_instance_lies_in_its_silhouette(visibility: str) 
     assert sorted(reading.silhouettes) == list(range(1, 13))
 
 
-def test_an_instance_out_of_sight_has_an_empty_silhouette() -> None:
-    """Behind the camera: a mask of no rows and no columns."""
-    body = Body("box", "box", SE3((0.0, 0.0, -3.0)), instance_id=1)
+def test_silhouettes_end_at_the_camera_and_at_the_canvas_of_three_images() -> None:
+    """Of a body behind the camera, no rows and no columns; a box next to it is cut by its plane."""
+    behind = Body("behind", "box", SE3((0.0, 0.0, -3.0)), instance_id=1)
+    aside = Body("aside", "box", SE3((0.6, 0.0, 0.0)), instance_id=2)
 
-    assert rendered(scene_of(body), forward_camera()).silhouettes[1].mask.shape == (0, 0)
+    silhouettes = rendered(scene_of(behind, aside), forward_camera()).silhouettes
 
-
-def test_a_body_cut_by_the_plane_of_the_camera_is_bounded_by_the_canvas() -> None:
-    """A long beam beside the camera: its silhouette ends at the canvas of three images."""
-    body = Body("beam", "box", SE3((0.6, 0.0, 0.0)), scale=1.0, instance_id=1)
-
-    silhouette = rendered(scene_of(body), forward_camera()).silhouettes[1]
-
-    assert silhouette.x_px + silhouette.mask.shape[1] == 128
-    assert silhouette.mask.any()
+    assert silhouettes[1].mask.shape == (0, 0)
+    assert silhouettes[2].x_px + silhouettes[2].mask.shape[1] == 128
+    assert silhouettes[2].mask.any()

@@ -10,17 +10,15 @@ import warp as wp
 from gen_data.core import asset_types, se3
 from gen_data.core.capture import Channel
 from gen_data.core.photometry import add_fixture, fixture_asset, luminance_cd_m2
-from gen_data.core.scene import Body, Camera, Light, Scene
+from gen_data.core.scene import Body, Light, Scene
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.realtime.light_selection import main_lamps
-from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene import brdf_albedo_lut, scene_packing
 from gen_data.renderers.warp.scene.kernels import analytic_lights, brdf, records
-from gen_data.renderers.warp.settings import RenderSettings
 from tests.embree import RayCaster, placed
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at, plane_mesh
+from tests.renderers.images import SHARP, drawn, seen
 
-PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0, antialias=1)
 RECTANGLE = Light(
     "r", "rectangle", (0.3, -0.2, 1.6), (0.0, -0.6, -0.8), intensity_cd=100.0,
     size_m=(1.2, 0.6), side=(1.0, 0.0, 0.0),
@@ -208,15 +206,6 @@ def test_a_panel_is_mirrored_about_as_brightly_as_its_integral(
     assert np.abs(mirrored - summed).mean() / summed.mean() < error
 
 
-def radiance_of(
-    scene: Scene, camera: Camera, library: FakeLibrary, settings: RenderSettings = PLAIN
-) -> np.ndarray:
-    reading = WarpRenderer(library, "cpu", settings).render(
-        scene, camera, frozenset({Channel.RADIANCE, Channel.Z_DEPTH})
-    )
-    return reading.channels[Channel.RADIANCE]
-
-
 @pytest.mark.slow
 def test_a_matte_plane_under_a_ceiling_panel_is_lit_as_by_quadrature() -> None:
     """Whole images, at every pixel: luminance = E rho / pi."""
@@ -225,7 +214,7 @@ def test_a_matte_plane_under_a_ceiling_panel_is_lit_as_by_quadrature() -> None:
     camera = camera_at((0.0, -0.01, 0.7), (0.0, 0.0, 0.0), (40, 30), hfov_deg=100.0)
     library = FakeLibrary({"plane": plane_mesh(20.0, (MATTE,))})
 
-    luminance = radiance_of(scene, camera, library)[..., 1]
+    luminance = drawn(scene, camera, library, SHARP)[..., 1]
 
     d = camera.T_world_camera.rotate(
         camera.intrinsics.unproject(np.ones((30, 40), np.float32)).reshape(30, 40, 3)
@@ -254,7 +243,7 @@ def test_shadows_of_panels_are_as_soft_as_their_shape_says(light: Light) -> None
     scene = Scene("t", (Body("p", "plane"), block), lights=(light,), environment=DARK)
     camera = camera_at((0.0, -0.01, 6.0), (0.0, 0.0, 0.0), (320, 240), hfov_deg=14.0)
 
-    measured = radiance_of(scene, camera, library)[::8, ::8, 1] * math.pi / 0.5
+    measured = drawn(scene, camera, library, SHARP)[::8, ::8, 1] * math.pi / 0.5
 
     d = camera.T_world_camera.rotate(
         camera.intrinsics.unproject(np.ones((240, 320), np.float32)).reshape(240, 320, 3)
@@ -275,22 +264,27 @@ def test_shadows_of_panels_are_as_soft_as_their_shape_says(light: Light) -> None
     assert np.abs(error[~shaded]).max() < 0.15
 
 
+def below_a_panel(floor: asset_types.Material) -> tuple[Scene, Light, FakeLibrary]:
+    """A floor in the dark, a panel 1 m above it, and meshes with the panel's fixture."""
+    light = replace(RECTANGLE, position_m=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
+    glass = asset_types.Material((0.8, 0.8, 0.8), role="lamp")
+    fixture = _fixture_mesh((1.2, 0.6, 0.04), glass)
+    library = FakeLibrary({fixture_asset(light): fixture, "plane": plane_mesh(20.0, (floor,))})
+    return Scene("t", (Body("p", "plane"),), environment=DARK), light, library
+
+
 def test_a_panel_is_seen_in_its_fixture_and_labels_do_not_know_it() -> None:
     """As bright as I / A from the front, dark from behind; instance 0; no self-shadow."""
-    light = replace(RECTANGLE, position_m=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
-    asset = fixture_asset(light)
-    glass = asset_types.Material((0.8, 0.8, 0.8), role="lamp")
-    meshes = {asset: _fixture_mesh((1.2, 0.6, 0.04), glass), "plane": plane_mesh(20.0, (MATTE,))}
-    library = FakeLibrary(meshes)
-    scene = Scene("t", (Body("p", "plane"),), environment=DARK)
-    scene, shown = add_fixture(scene, light, library.materials(asset))
+    scene, light, library = below_a_panel(MATTE)
+    scene, shown = add_fixture(scene, light, library.materials(fixture_asset(light)))
     scene = replace(scene, lights=(shown,))
-    renderer = WarpRenderer(library, "cpu", PLAIN)
-    wanted = frozenset({Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH})
+    wanted = (Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH)
 
-    def middle(eye_m: se3.Vec3, target_m: se3.Vec3) -> tuple[float, int, float]:
+    def middle(
+        eye_m: se3.Vec3, target_m: se3.Vec3, scene: Scene = scene
+    ) -> tuple[float, int, float]:
         camera = camera_at(eye_m, target_m, (24, 18), hfov_deg=20.0)
-        channels = renderer.render(scene, camera, wanted).channels
+        channels = seen(scene, camera, library, *wanted, settings=SHARP)
         return (
             float(channels[Channel.RADIANCE][9, 12, 1]),
             int(channels[Channel.INSTANCE][9, 12]),
@@ -300,18 +294,16 @@ def test_a_panel_is_seen_in_its_fixture_and_labels_do_not_know_it() -> None:
     before, behind = middle((0.0, 0.01, 0.3), (0, 0, 1)), middle((0.0, 0.01, 3.0), (0, 0, 1))
     below = middle((0.9, 0.0, 0.5), (0.0, 0.0, 0.0))
     bare = replace(scene, bodies=scene.bodies[:1], lights=(light,))
-    unseen = WarpRenderer(library, "cpu", PLAIN).render(
-        bare, camera_at((0.9, 0.0, 0.5), (0.0, 0.0, 0.0), (24, 18), hfov_deg=20.0), wanted
-    )
+    unseen = middle((0.9, 0.0, 0.5), (0.0, 0.0, 0.0), bare)
 
     assert (before[0], before[1]) == (pytest.approx(100.0 / 0.72, rel=0.02), 0)
     assert before[2] == pytest.approx(0.701, abs=1e-3)
     assert behind[0] == 0.0
-    assert below[0] == pytest.approx(float(unseen.channels[Channel.RADIANCE][9, 12, 1]), rel=1e-5)
+    assert below[0] == pytest.approx(unseen[0], rel=1e-5)
 
 
 def _fixture_mesh(size_m: se3.Vec3, front: asset_types.Material):  # noqa: ANN202
-    """A box that stands on z = 0, its lower side in a slot of its own."""
+    """A box that stands on z = 0, its lower side in a separate slot."""
     mesh = box_mesh(size_m, (MATTE, front))
     vertices = mesh.vertices_m + np.array([0.0, 0.0, 0.5 * size_m[2]], np.float32)
     low = (vertices[mesh.faces][..., 2] < 1e-6).all(axis=1)
@@ -333,19 +325,13 @@ def test_of_many_panels_those_that_light_what_is_seen_are_kept() -> None:
 @pytest.mark.parametrize("visible", [True, False])
 def test_a_mirror_shows_a_panel_once(visible: bool) -> None:
     """As bright as the panel times the metal's 0.9, whether by a reflected ray or by the lobe."""
-    light = replace(RECTANGLE, position_m=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
-    asset = fixture_asset(light)
-    glass = asset_types.Material((0.8, 0.8, 0.8), role="lamp")
-    silver = asset_types.Material((0.9, 0.9, 0.9), 0.08, 1.0)
-    meshes = {asset: _fixture_mesh((1.2, 0.6, 0.04), glass), "plane": plane_mesh(20.0, (silver,))}
-    library = FakeLibrary(meshes)
-    scene = Scene("t", (Body("p", "plane"),), environment=DARK)
+    scene, light, library = below_a_panel(asset_types.Material((0.9, 0.9, 0.9), 0.08, 1.0))
     if visible:
-        scene, light = add_fixture(scene, light, library.materials(asset))
+        scene, light = add_fixture(scene, light, library.materials(fixture_asset(light)))
     scene = replace(scene, lights=(light,))
     camera = camera_at((-0.3, 0.0, 0.8), (0.0, 0.0, 0.0), (48, 36), hfov_deg=8.0)
 
-    luminance = radiance_of(scene, camera, library)[18, 24, 1]
+    luminance = drawn(scene, camera, library, SHARP)[18, 24, 1]
 
     tolerance = 0.02 if visible else 0.2
     assert luminance == pytest.approx(0.9 * 100.0 / 0.72, rel=tolerance)

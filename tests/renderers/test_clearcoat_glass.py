@@ -16,6 +16,7 @@ from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.kernels import brdf
 from gen_data.renderers.warp.settings import RenderSettings
+from tests.renderers import images
 from tests.renderers.fake_library import (
     DARK,
     MATTE,
@@ -28,7 +29,6 @@ from tests.renderers.fake_library import (
 )
 
 RADIANCE = frozenset({Channel.RADIANCE})
-SHARP = RenderSettings(antialias=1, ambient_occlusion_radius_m=0.0)
 GLASS = Material((1.0, 1.0, 1.0), 0.0, transmission=1.0, ior=1.5)
 FURNACE = Environment(luminance_cd_m2=100.0)
 
@@ -41,9 +41,7 @@ def radiance_of(
     environment: Environment = DARK,
 ) -> np.ndarray:
     scene = Scene("t", bodies, lights=lights, environment=environment)
-    camera = replace(camera, ev100=8.0)
-    reading = WarpRenderer(library, "cpu", SHARP).render(scene, camera, RADIANCE)
-    return reading.channels[Channel.RADIANCE]
+    return images.drawn(scene, replace(camera, ev100=8.0), library, images.SHARP)
 
 
 def glowing(luminance_cd_m2: float) -> Material:
@@ -107,43 +105,42 @@ def test_a_pane_sums_the_series_of_its_inner_reflections(tint: float) -> None:
             assert reflected + passed == pytest.approx(1.0, rel=1e-4)
 
 
+def ball_in_furnace(material: Material, rings: int) -> np.ndarray:
+    """The middle of a ball, relative to the even light around it."""
+    library = FakeLibrary({"ball": sphere_mesh(0.5, rings, (material,))})
+    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (64, 48), hfov_deg=20.0)
+    image = radiance_of((Body("b", "ball"),), library, camera, environment=FURNACE)
+    return image[12:36, 20:44] / 100.0
+
+
 @pytest.mark.parametrize(
     "base", [MATTE, Material((1, 1, 1), 1.0), Material((1, 1, 1), 0.4, 1.0), Material()]
 )
 @pytest.mark.parametrize("coat_roughness", [0.03, 0.3, 0.8])
 def test_a_coated_ball_in_a_furnace_keeps_the_energy(base: Material, coat_roughness: float) -> None:
     """White stays white within 2 %, and no base exceeds the furnace."""
-    coated = replace(base, coat=1.0, coat_roughness=coat_roughness)
-    library = FakeLibrary({"ball": sphere_mesh(0.5, 48, (coated,))})
-    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (64, 48), hfov_deg=20.0)
+    inside = ball_in_furnace(replace(base, coat=1.0, coat_roughness=coat_roughness), 48)
 
-    share = radiance_of((Body("b", "ball"),), library, camera, environment=FURNACE) / 100.0
-
-    inside = share[12:36, 20:44]
     assert inside.max() <= 1.005
     if min(base.base_color) == 1.0:
         assert inside.min() >= 0.98
     elif base.roughness == 1.0:
-        # (1 - share) 0.5 + share of the coat: 4 % head-on for a smooth one, more beside.
+        # (1 - share) 0.5 + share of the coat: 4 % head-on for a smooth one, more aside.
         assert 0.51 <= inside.min() < inside.max() < 0.75
 
 
 @pytest.mark.parametrize("thin", [True, False])
 def test_clear_glass_vanishes_in_a_furnace(thin: bool) -> None:
     """Reflection and transmission sum to 1 within 3 % for a pane and for a solid ball."""
-    library = FakeLibrary({"ball": sphere_mesh(0.5, 64, (replace(GLASS, thin=thin),))})
-    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (64, 48), hfov_deg=20.0)
+    inside = ball_in_furnace(replace(GLASS, thin=thin), 64)
 
-    share = radiance_of((Body("b", "ball"),), library, camera, environment=FURNACE) / 100.0
-
-    inside = share[12:36, 20:44]
     assert inside.max() <= 1.03
     assert inside.mean() == pytest.approx(1.0, abs=0.04)
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 50.0])
 @pytest.mark.parametrize("tint", [1.0, 0.5])
-def test_light_behind_a_pane_is_what_the_series_leaves(angle_deg: float, tint: float) -> None:
+def test_light_behind_a_pane_is_the_remainder_of_the_series(angle_deg: float, tint: float) -> None:
     """100 cd/m^2 behind a thin pane at normal and oblique incidence, in an otherwise dark room.
 
     The mesh is a single sheet; with F of one face T = (1 - F)^2 a / (1 - F^2 a^2).
@@ -247,7 +244,7 @@ def test_a_glass_ball_shows_the_world_upside_down_where_snell_says() -> None:
 def test_a_mirror_shows_the_mirrored_scene() -> None:
     """A box before a perfect mirror equals the same box behind a window: all but 1 % of pixels.
 
-    The sun shines along the mirror, so that both boxes are lit alike.
+    The sun shines along the mirror: both boxes are lit alike.
     """
     mirror = Material((1, 1, 1), 0.0, 1.0)
     meshes = {"box": box_mesh((0.4, 0.6, 0.3), (MATTE,)), "mirror": plane_mesh(8.0, (mirror,))}
@@ -295,7 +292,7 @@ def test_an_edge_in_a_mirror_is_the_mean_of_tones_of_a_camera_with_many_photosit
     assert between.ravel() == pytest.approx(np.full(48, math.exp(log_mean) - 5.0), rel=0.03)
 
 
-def test_what_is_seen_in_a_mirror_is_as_far_as_the_whole_way() -> None:
+def test_mirrored_textures_are_as_far_as_the_whole_way() -> None:
     """A fine, distant checker in a mirror becomes its mean: mip levels follow the whole path."""
     y, x = np.mgrid[:256, :256]
     tile = np.where(((x // 2 + y // 2) % 2)[..., None], 255, 0) * np.ones(3)
@@ -382,18 +379,18 @@ def test_opacity_mixes_with_what_is_behind() -> None:
     bodies = (Body("veil", "veil", SE3((0, 0, 1.0)), instance_id=1), Body("wall", "wall"))
     scene = Scene("t", bodies, environment=DARK)
     camera = camera_at((0, 0, 3.0), (0, 0, 0), (33, 33), 20.0, ev100=8.0)
-    wanted = RADIANCE | {Channel.INSTANCE, Channel.Z_DEPTH}
+    wanted = (Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH)
 
-    seen = WarpRenderer(library, "cpu", SHARP).render(scene, camera, wanted).channels
+    channels = images.seen(scene, camera, library, *wanted, settings=images.SHARP)
 
-    np.testing.assert_allclose(seen[Channel.RADIANCE][16, 16], 130.0, rtol=1e-3)
-    assert seen[Channel.INSTANCE][16, 16] == 1
-    assert seen[Channel.Z_DEPTH][16, 16] == pytest.approx(2.0, rel=1e-5)
+    np.testing.assert_allclose(channels[Channel.RADIANCE][16, 16], 130.0, rtol=1e-3)
+    assert channels[Channel.INSTANCE][16, 16] == 1
+    assert channels[Channel.Z_DEPTH][16, 16] == pytest.approx(2.0, rel=1e-5)
 
 
 @pytest.mark.parametrize("material", [GLASS, replace(MATTE, opacity=0.2)])
 def test_clear_bodies_throw_no_shadow(material: Material) -> None:
-    """The sun's light below a clear plate equals that beside it."""
+    """The sun's light below a clear plate equals the light next to it."""
     library = FakeLibrary(
         {"floor": plane_mesh(9.0, (MATTE,)), "plate": box_mesh((1, 1, 0.1), (material,))}
     )

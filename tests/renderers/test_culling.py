@@ -1,4 +1,4 @@
-"""Culling before rendering removes only what cannot matter, and edges stay in place."""
+"""Culling before rendering removes only hidden bodies, and edges stay in place."""
 
 import numpy as np
 import pytest

@@ -5,13 +5,13 @@ import sys
 import numpy as np
 import pytest
 
-from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Body, Light, Scene
 from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at, room_mesh
+from tests.renderers.images import drawn
 
 DENOISED = RenderSettings(tier="pathtraced", samples=4, denoise=True)
 
@@ -27,9 +27,7 @@ def test_a_denoised_image_is_closer_to_the_converged_one() -> None:
     camera = camera_at((0.0, -0.9, 1.0), (0.0, 1.0, 0.7), (96, 72), 70.0)
 
     def radiance(settings: RenderSettings) -> np.ndarray:
-        renderer = WarpRenderer(library, "cpu", settings)
-        reading = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
-        return reading.channels[Channel.RADIANCE].astype(np.float64)
+        return drawn(scene, camera, library, settings).astype(np.float64)
 
     truth = radiance(RenderSettings(tier="pathtraced", samples=256))
     noisy = radiance(RenderSettings(tier="pathtraced", samples=4))

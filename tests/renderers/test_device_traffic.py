@@ -1,4 +1,4 @@
-"""Budgets of what crosses between host and device, counted as on a GPU; none is needed."""
+"""Budgets of transfers between host and device, counted as on a GPU; none is needed."""
 
 from collections.abc import Callable
 from functools import cache
@@ -156,7 +156,7 @@ def test_bits_are_packed_as_by_numpy(pixels: list[bool]) -> None:
 
 
 def test_values_cross_again_only_if_they_change() -> None:
-    """With memory of its own, a device keeps the last two values of each name."""
+    """With separate memory, a device keeps the last two values of each name."""
     cache_ = DeviceCache(FakeLibrary({}), CPU)
     cache_.shares_memory = False
     one, two = np.arange(6, dtype=np.float32), np.ones(6, np.float32)

@@ -12,10 +12,10 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.material_packing import body_materials
 from gen_data.renderers.warp.settings import RenderSettings
+from tests.renderers import images
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, camera_at, plane_mesh
 from tests.renderers.paths import ASKED, MET, radiance_of, replicates_of, settings_of
 
@@ -23,11 +23,10 @@ REFLECTED, PASSED = (0.3, 0.3, 0.3), (0.2, 0.4, 0.05)
 LEAF = Material(REFLECTED, roughness=1.0, specular=0.0, diffuse_transmission=PASSED)
 WHITE_SHEET = replace(LEAF, base_color=(0.7, 0.2, 0.5), diffuse_transmission=(0.3, 0.8, 0.5))
 UNIFORM = Environment(luminance_cd_m2=100.0)
-NO_SHADE = RenderSettings(ambient_occlusion_radius_m=0.0)
 
 
 def sheet(material: Material = LEAF, normal: Vec3 = (0.0, 0.0, 1.0)) -> MeshData:
-    """A level square of 4 m whose smooth normals may differ from those of its face."""
+    """A level square of 4 m whose smooth normals may differ from its face's."""
     flat = plane_mesh(4.0, (material,))
     unit = np.array(normal) / np.linalg.norm(normal)
     return replace(flat, normals=np.tile(unit, (4, 1)).astype(np.float32))
@@ -42,11 +41,8 @@ def from_above() -> Camera:
     return camera_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), (16, 12), hfov_deg=2.0)
 
 
-def drawn(scene: Scene, library: FakeLibrary, settings: RenderSettings = NO_SHADE) -> Float32:
-    reading = WarpRenderer(library, "cpu", settings).render(
-        scene, from_above(), frozenset({Channel.RADIANCE})
-    )
-    return np.asarray(reading.channels[Channel.RADIANCE].mean(axis=(0, 1)))
+def drawn(scene: Scene, library: FakeLibrary) -> Float32:
+    return np.asarray(images.drawn(scene, from_above(), library).mean(axis=(0, 1)))
 
 
 def sun_along(x: float, z: float) -> Light:
@@ -91,7 +87,7 @@ def test_an_opaque_surface_stays_dark_with_the_sun_behind_it() -> None:
     assert drawn(scene, library).max() == 0.0
 
 
-def test_what_stands_before_the_lamp_shades_the_other_side() -> None:
+def test_a_body_before_the_lamp_shades_the_other_side() -> None:
     """A box below the leaf throws its shadow on it; a box above does not."""
     for z_m, lit in ((-0.5, False), (3.5, True)):
         scene, library = over(sheet(), Body("box", "box", SE3((0.0, 0.0, z_m))))
@@ -108,10 +104,10 @@ def test_a_sheet_that_absorbs_nothing_disappears_in_a_furnace(normal: Vec3) -> N
     scene, library = over(sheet(WHITE_SHEET, normal))
     scene = replace(scene, environment=UNIFORM)
 
-    images = replicates_of(scene, from_above(), library, 64, 4)
+    traced = replicates_of(scene, from_above(), library, 64, 4)
 
-    error = images.std(axis=0).mean() / math.sqrt(images.shape[1] * images.shape[2])
-    np.testing.assert_allclose(images.mean(axis=(0, 1, 2)), 100.0, atol=4.0 * error + 0.1)
+    error = traced.std(axis=0).mean() / math.sqrt(traced.shape[1] * traced.shape[2])
+    np.testing.assert_allclose(traced.mean(axis=(0, 1, 2)), 100.0, atol=4.0 * error + 0.1)
     if normal[0] == 0.0:
         np.testing.assert_allclose(drawn(scene, library), 100.0, rtol=5e-3)
 
@@ -122,8 +118,8 @@ def test_a_glossy_sheet_keeps_the_energy() -> None:
     scene = replace(scene, environment=UNIFORM)
 
     np.testing.assert_allclose(drawn(scene, library), 100.0, rtol=5e-3)
-    images = replicates_of(scene, from_above(), library, 128, 4)
-    np.testing.assert_allclose(images.mean(axis=(0, 1, 2)), 100.0, rtol=5e-3)
+    traced = replicates_of(scene, from_above(), library, 128, 4)
+    np.testing.assert_allclose(traced.mean(axis=(0, 1, 2)), 100.0, rtol=5e-3)
 
 
 def test_either_technique_alone_agrees_on_light_through_a_leaf() -> None:
@@ -142,7 +138,7 @@ def test_either_technique_alone_agrees_on_light_through_a_leaf() -> None:
 
 
 def test_a_sheet_never_scatters_more_than_it_receives() -> None:
-    """A transmittance beyond what reflection leaves is reduced, per channel."""
+    """A transmittance beyond the remainder of reflection is reduced, per channel."""
     scene, library = over(sheet(replace(LEAF, diffuse_transmission=(0.9, 0.5, 0.7))))
     (packed,) = body_materials(scene.bodies, DeviceCache(library, open_device("cpu")))
 
@@ -167,7 +163,7 @@ def test_snow_on_a_leaf_hides_the_light_below_it() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("azimuth_deg", [0.0, 90.0, 180.0])
 def test_a_crown_is_as_bright_as_in_the_path_tracer(azimuth_deg: float) -> None:
-    """Mean luminance of an oak before the sun, beside and after it, within 25 %."""
+    """Mean luminance of an oak before, next to and after the sun, within 25 %."""
     from gen_data.randomizers.daylight import set_daylight
     from gen_data.sky.sky import SkyModel
 
@@ -183,12 +179,12 @@ def test_a_crown_is_as_bright_as_in_the_path_tracer(azimuth_deg: float) -> None:
     scene = set_daylight(scene, SkyModel(0, 35.0, 2.5, 0.0, 0.18, "measured"), azimuth_deg)
     scene = replace(scene, environment=replace(scene.environment, visible=False))
     camera = camera_at((-30.0, 0.0, 1.6), (0.0, 0.0, 0.6 * (high[2] - low[2])), (64, 64), 24.0)
-    channels = frozenset({Channel.RADIANCE, Channel.INSTANCE})
 
     means = []
     for settings in (RenderSettings(), settings_of(32, 12)):
-        reading = WarpRenderer(library, "cpu", settings).render(scene, camera, channels)
-        crown = reading.channels[Channel.INSTANCE][:40] == 1
-        means.append(reading.channels[Channel.RADIANCE][:40][crown].mean(axis=0)[1])
+        wanted = (Channel.RADIANCE, Channel.INSTANCE)
+        channels = images.seen(scene, camera, library, *wanted, settings=settings)
+        crown = channels[Channel.INSTANCE][:40] == 1
+        means.append(channels[Channel.RADIANCE][:40][crown].mean(axis=0)[1])
 
     assert means[0] == pytest.approx(means[1], rel=0.25)

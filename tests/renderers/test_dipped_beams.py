@@ -5,15 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Light, Scene
 from gen_data.core.se3 import SE3
 from gen_data.randomizers.vehicle_lights import dipped_beam
 from gen_data.renderers.warp.realtime.light_selection import dipped_share, main_lamps
-from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.kernels import records
-from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at
+from tests.renderers.images import drawn
 
 BEAMS_CD = (9000.0, 11_500.0, 14_000.0)
 SCREEN_M = 25.0
@@ -79,10 +77,7 @@ def test_pictures_of_a_screen_show_what_the_regulation_asks(point: str) -> None:
     scene = Scene("t", (wall,), lights=(headlight(beam_cd),), environment=DARK)
     camera = camera_at((SCREEN_M - 2.0, p[1], p[2]), tuple(p), (9, 9), hfov_deg=0.2)
 
-    reading = WarpRenderer(library, "cpu", RenderSettings(ambient_occlusion_radius_m=0.0)).render(
-        scene, camera, frozenset({Channel.RADIANCE})
-    )
-    lux = reading.channels[Channel.RADIANCE][4, 4] @ LUMINANCE * math.pi / 0.5
+    lux = drawn(scene, camera, library)[4, 4] @ LUMINANCE * math.pi / 0.5
 
     assert least <= lux <= most
 

@@ -10,15 +10,14 @@ from gen_data.core import asset_types, se3
 from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Environment, Light, Region, Scene
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene import environment_maps
 from gen_data.renderers.warp.settings import RenderSettings
 from tests import embree, tiers
 from tests.renderers import fake_library
+from tests.renderers.images import SHARP, drawn, seen
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0, antialias=1)
-OFF = PLAIN.model_copy(update={"environment_shadow": "off"})
+OFF = SHARP.model_copy(update={"environment_shadow": "off"})
 MEAN_CD_M2 = 500.0
 
 
@@ -157,16 +156,14 @@ def scene_under(
 
 
 def luminance_of(
-    scene: Scene, library: fake_library.FakeLibrary, settings: RenderSettings = PLAIN
+    scene: Scene, library: fake_library.FakeLibrary, settings: RenderSettings = SHARP
 ) -> tuple[np.ndarray, np.ndarray]:
     """Luminance on the ground seen from above, linear RGB, and where that is."""
     camera = fake_library.camera_at((0.0, -0.01, 6.0), (0.0, 0.0, 0.0), (320, 240), hfov_deg=20.0)
     scene = replace(scene, cameras=(camera,))
-    reading = WarpRenderer(library, "cpu", settings).render(
-        scene, camera, frozenset({Channel.RADIANCE, Channel.Z_DEPTH})
-    )
-    p = camera.T_world_camera.apply(camera.intrinsics.unproject(reading.channels[Channel.Z_DEPTH]))
-    return reading.channels[Channel.RADIANCE][::8, ::8], p[::8, ::8]
+    channels = seen(scene, camera, library, Channel.RADIANCE, Channel.Z_DEPTH, settings=settings)
+    p = camera.T_world_camera.apply(camera.intrinsics.unproject(channels[Channel.Z_DEPTH]))
+    return channels[Channel.RADIANCE][::8, ::8], p[::8, ::8]
 
 
 @pytest.mark.parametrize("name", SKIES)
@@ -231,14 +228,14 @@ def test_shadows_can_be_switched_off() -> None:
 
 
 @pytest.mark.parametrize(
-    "what", ["a sun of its own", "walls all around", "lamps that drown it", "an even sky"]
+    "what", ["another sun", "walls all around", "lamps that drown it", "an even sky"]
 )
 def test_nothing_changes_where_no_shadow_would_be_seen(what: str) -> None:
     """The same bytes as without: light in a closed room does not come from the sky."""
     environment = Environment("sun", MEAN_CD_M2)
     block = Body("b", "box", se3.SE3((0.0, 0.0, 0.15)), 0.3)
     scene, library = scene_under(environment, block)
-    if what == "a sun of its own":
+    if what == "another sun":
         sun = Light("s", "sun", direction=(0.6, 0.0, -0.8), illuminance_lux=1000.0)
         scene = replace(scene, lights=(sun,))
     elif what == "walls all around":
@@ -249,32 +246,25 @@ def test_nothing_changes_where_no_shadow_would_be_seen(what: str) -> None:
     else:
         scene = replace(scene, environment=replace(environment, image="environment/neutral?seed=0"))
     camera = fake_library.camera_at((1.5, -1.0, 1.2), (0.0, 0.0, 0.1), (64, 48), hfov_deg=50.0)
-    images = [
-        WarpRenderer(library, "cpu", settings)
-        .render(replace(scene, cameras=(camera,)), camera, frozenset({Channel.RADIANCE}))
-        .channels[Channel.RADIANCE]
-        for settings in (PLAIN, OFF)
-    ]
+    scene = replace(scene, cameras=(camera,))
+    with_shadows, without = (drawn(scene, camera, library, s) for s in (SHARP, OFF))
 
-    np.testing.assert_array_equal(images[0], images[1])
+    np.testing.assert_array_equal(with_shadows, without)
+
+
+TO_THE_SUN = fake_library.camera_at(
+    (0.0, 0.0, 0.5), (6.0, 3.0, 7.0), (33, 25), hfov_deg=20.0, ev100=8.0
+)
 
 
 def test_the_sun_of_a_panorama_is_seen_where_it_is() -> None:
     """Background pixels show the image itself, with the sun in it."""
     scene, library = scene_under(Environment("sun", MEAN_CD_M2))
-    towards = 10.0 * np.array((0.6, 0.3, 0.7))
-    camera = fake_library.camera_at(
-        (0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0
-    )
-    images = [
-        WarpRenderer(library, "cpu", settings)
-        .render(replace(scene, cameras=(camera,)), camera, frozenset({Channel.RADIANCE}))
-        .channels[Channel.RADIANCE]
-        for settings in (PLAIN, OFF)
-    ]
+    scene = replace(scene, cameras=(TO_THE_SUN,))
+    with_shadows, without = (drawn(scene, TO_THE_SUN, library, s) for s in (SHARP, OFF))
 
-    np.testing.assert_array_equal(images[0], images[1])
-    assert images[0].max() > 100.0 * np.median(images[0])
+    np.testing.assert_array_equal(with_shadows, without)
+    assert without.max() > 100.0 * np.median(without)
 
 
 def test_the_sun_of_a_panorama_is_seen_through_a_pane() -> None:
@@ -282,23 +272,14 @@ def test_the_sun_of_a_panorama_is_seen_through_a_pane() -> None:
     pane = asset_types.Material((1.0, 1.0, 1.0), 0.0, transmission=1.0)
     scene, library = scene_under(Environment("sun", MEAN_CD_M2))
     library.meshes["sheet"] = fake_library.plane_mesh(6.0, (pane,))
-    towards = 10.0 * np.array((0.6, 0.3, 0.7))
-    camera = fake_library.camera_at(
-        (0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0
-    )
     behind = replace(scene, bodies=(*scene.bodies, Body("s", "sheet", se3.SE3((0.0, 0.0, 2.0)))))
-    open_air, through = (
-        WarpRenderer(library, "cpu", PLAIN)
-        .render(one, camera, frozenset({Channel.RADIANCE}))
-        .channels[Channel.RADIANCE]
-        for one in (scene, behind)
-    )
+    open_air, through = (drawn(one, TO_THE_SUN, library, SHARP) for one in (scene, behind))
 
     brightest = np.unravel_index(int(open_air[..., 1].argmax()), open_air.shape[:2])
     assert through[brightest][1] > 0.7 * open_air[brightest][1]
 
 
-def test_a_large_low_sun_lights_what_it_has_half_set_for() -> None:
+def test_a_large_low_sun_lights_walls_that_it_has_half_set_for() -> None:
     """A disc of 5 degrees in the horizon of a wall: L r^3 2 / 3 instead of none.
 
     By integrating its upper half: E = L * 2 / 3 r^3, with L = E_n / (pi r^2), for small r.

@@ -47,7 +47,7 @@ def through(homography: np.ndarray) -> np.ndarray:
 
 
 def camera_motion(scene: Scene, step_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation and translation from the camera's frame to that of another instant."""
+    """Rotation and translation from the camera's frame to the one of another instant."""
     other = scene_at(scene, scene.time_s + step_s)
     pose = other.cameras[0].T_world_camera.inverse() @ scene.cameras[0].T_world_camera
     return pose.rotation(), np.asarray(pose.translation_m)
@@ -136,7 +136,7 @@ def test_going_there_and_back_leads_to_the_same_pixel(renderer: WarpRenderer) ->
     seen &= (first >= 0).all(-1) & (first + 1 < [LENS.width_px, LENS.height_px]).all(-1)
     x, y = np.where(seen, first[..., 0], 0), np.where(seen, first[..., 1], 0)
     corners = [(0, 0), (1, 0), (0, 1), (1, 1)]
-    # On the same face of the same thing, so that flow is smooth between pixels.
+    # On the same face of the same object, where flow is smooth between pixels.
     depths = np.stack([then[Channel.Z_DEPTH][y + b, x + a] for a, b in corners])
     for a, b in corners:
         seen &= then[Channel.INSTANCE][y + b, x + a] == now[Channel.INSTANCE]
@@ -151,7 +151,7 @@ def test_going_there_and_back_leads_to_the_same_pixel(renderer: WarpRenderer) ->
 
 
 def test_points_are_occluded_where_a_ray_meets_something(renderer: WarpRenderer) -> None:
-    """Every pixel's point, traced by a ray of its own a step later; edges are a pixel wide."""
+    """Every pixel's point, traced by a separate ray a step later; edges are a pixel wide."""
     start = SE3((-0.6, 0.0, 3.0))
     box = Body("box", "box", start, instance_id=1)
     scene = world(
@@ -244,7 +244,7 @@ def test_a_rolling_shutter_changes_the_flow(renderer: WarpRenderer, readout_s: f
 
     expected = speed_px_s * STEP_S / (1.0 - speed_px_s * readout_s / LENS.height_px)
     assert abs(expected - speed_px_s * STEP_S) > 0.15
-    # Instants are those of bands of rows, in which things move by a quarter of a pixel at most.
+    # Bands of rows share an instant; bodies move by a quarter of a pixel in them at most.
     np.testing.assert_allclose(flow[..., 1], expected, atol=0.26)
     assert flow[..., 1].mean() == pytest.approx(expected, abs=0.03)
     np.testing.assert_allclose(flow[..., 0], 0.0, atol=1e-4)

@@ -72,7 +72,7 @@ def test_a_module_that_was_never_complete_is_found_without_a_digest(folder: Path
 
 
 def test_sources_other_programs_and_compilations_in_progress_do_not_matter(folder: Path) -> None:
-    """Only what Warp loads for gen-data is checked."""
+    """Only files that Warp loads for gen-data are checked."""
     unfinished = folder / f"{MODULES[0]}_p12_t34"
     others = folder / "wp_other_0123abc"
     for path in (unfinished, others):
@@ -113,7 +113,7 @@ def refusing(*refused: Path, number: int = errno.EROFS) -> Callable[[Path], None
 def test_a_filled_cache_that_cannot_be_written_is_linked_in_silence(
     folder: Path, temporary: Path, number: int
 ) -> None:
-    """Modules that are missing from it are compiled beside the links."""
+    """Modules that are missing from it are compiled next to the links."""
     kernel_cache.remove_damaged_modules(folder)
     (folder / STAMP).touch()
 

@@ -17,7 +17,14 @@ from gen_data.core.shutter import INSTANT, Shutter
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.embree import cast_layers, near_edges
-from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh, sphere_mesh
+from tests.renderers.fake_library import (
+    FakeLibrary,
+    box_mesh,
+    camera_at,
+    plane_mesh,
+    scattered_pose,
+    sphere_mesh,
+)
 from tests.renderers.moving import world
 from tests.renderers.test_alpha_cutouts import GRATE, grate_texture
 
@@ -154,15 +161,13 @@ def test_layers_of_a_rolling_shutter_are_those_of_each_row() -> None:
 
 
 def random_scene(seed: int) -> tuple[Scene, Camera]:
-    """Thirty rotated bodies of glass, film and opaque things, which cut each other, in a row."""
+    """Thirty rotated bodies of glass, film and opaque materials, which cut each other, in a row."""
     rng = np.random.default_rng(seed)
     bodies = [Body("road", "road", SE3((0.0, 0.0, -0.5)), instance_id=1)]
     for k in range(30):
-        q = rng.normal(size=4)
-        w, x, y, z = (float(v) for v in q / np.linalg.norm(q))
-        place = tuple(float(v) for v in rng.uniform((-1.5, -0.4, -0.2), (1.5, 0.4, 0.3)))
+        pose = scattered_pose(rng, (-1.5, -0.4, -0.2), (1.5, 0.4, 0.3))
         asset = ("flask", "case", "flask", "box", "ball")[k % 5]
-        bodies.append(Body(f"b{k}", asset, SE3(place, (w, x, y, z)), instance_id=k + 2))
+        bodies.append(Body(f"b{k}", asset, pose, instance_id=k + 2))
     camera = camera_at((3.0, 0.3, 0.4), (0.0, 0.0, 0.0), (160, 100), 40.0)
     return Scene("random", tuple(bodies)), replace(camera, layers=6)
 

@@ -142,7 +142,7 @@ def test_a_pinhole_has_no_table_of_directions() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CAMERAS)
 def test_ranges_are_embrees_along_opencvs_directions(name: str) -> None:
-    """Boxes and balls before and beside the camera: 0.1 mm and equal ids on 99.9 % of pixels."""
+    """Boxes and balls before and next to the camera: 0.1 mm and equal ids on 99.9 % of pixels."""
     spots = np.random.default_rng(8).uniform((-2.0, -2.0, 0.8), (2.0, 2.0, 3.0), (24, 3))
     bodies = [Body("room", "room", SE3((0.0, 0.0, -0.5)))]
     bodies += [
@@ -409,7 +409,7 @@ def look_up(view: View, points: wp.array(dtype=wp.vec3), pixels: wp.array(dtype=
     "k", [*CAMERAS.values(), Intrinsics.from_hfov(64, 32, 6.2831853, Lens("equirectangular"))]
 )
 def test_reflections_look_points_up_where_they_are_seen(k: Intrinsics) -> None:
-    """The kernels' projection is that of Intrinsics; none outside the image or the field."""
+    """The kernels' projection equals that by Intrinsics; none outside the image or the field."""
     cache = DeviceCache(LIBRARY, open_device("cpu"))
     points = np.random.default_rng(2).normal(size=(4000, 3))
     places = k.project(points)

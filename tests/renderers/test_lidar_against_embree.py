@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 
-from gen_data.core.capture import LidarRays
+from gen_data.core.capture import LidarHits, LidarRays
 from gen_data.core.scene import Body, Instance, Lidar, Scene
 from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.embree import RayCaster, placed
-from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, room_mesh, sphere_mesh
+from tests.renderers.fake_library import (
+    FakeLibrary,
+    box_mesh,
+    plane_mesh,
+    room_mesh,
+    scattered_pose,
+    sphere_mesh,
+)
 
 MESHES = {
     "room": room_mesh((60.0, 60.0, 20.0)), "box": box_mesh((1.8, 4.0, 1.5)),
@@ -22,17 +29,9 @@ def random_scene(seed: int) -> tuple[Scene, Lidar]:
     away = (300.0, -200.0, 5.0)
     bodies = [Body("room", "room", SE3(away))]
     for k in range(40):
-        q = rng.normal(size=4)
-        place = np.asarray(away) + rng.uniform((-25, -25, 0), (25, 25, 6))
-        bodies.append(
-            Body(
-                f"b{k}",
-                str(rng.choice(["box", "ball"])),
-                SE3(tuple(map(float, place)), tuple(map(float, q / np.linalg.norm(q)))),
-                float(rng.uniform(0.4, 1.8)),
-                instance_id=k + 1,
-            )
-        )
+        pose = SE3(away) @ scattered_pose(rng, (-25, -25, 0), (25, 25, 6))
+        asset, scale = str(rng.choice(["box", "ball"])), float(rng.uniform(0.4, 1.8))
+        bodies.append(Body(f"b{k}", asset, pose, scale, instance_id=k + 1))
     things = tuple(Instance(k + 1, f"b{k}", "thing", 1, "box") for k in range(40))
     q = np.array([1.0, *rng.normal(scale=0.05, size=3)])
     eye = tuple(float(v) for v in np.add(away, (0.3, -0.4, 8.0)))
@@ -63,16 +62,21 @@ def test_ranges_and_labels_agree_with_embree(seed: int) -> None:
     assert (echoes.category_id[:, 0] == (ids > 0)).mean() >= 0.999
 
 
+DOWN = np.array([[0.0, 0.0, -1.0]], np.float32)
+
+
+def above_a_plane(height_m: float, beams: LidarRays) -> LidarHits:
+    """Echoes of a plane with instance id 3."""
+    lidar = Lidar("top", "color", T_world_lidar=SE3((10.0, 20.0, height_m)))
+    scene = Scene("plane", (Body("plane", "plane", instance_id=3),))
+    return WarpRenderer(FakeLibrary(MESHES), "cpu").scan(scene, lidar, beams)
+
+
 def test_a_ground_plane_is_where_geometry_says() -> None:
     """Range = height / sine of the angle downwards; cosine of incidence = that sine."""
     down = np.radians(np.array([1.0, 2.0, 5.0, 20.0, 60.0, 90.0]))
     rays = np.stack([np.cos(down), np.zeros(6), -np.sin(down)], axis=1).astype(np.float32)
-    lidar = Lidar("top", "color", T_world_lidar=SE3((10.0, 20.0, 1.73)))
-    scene = Scene("plane", (Body("plane", "plane"),))
-
-    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(
-        scene, lidar, LidarRays(rays, 0.0, 1, 120.0)
-    )
+    echoes = above_a_plane(1.73, LidarRays(rays, 0.0, 1, 120.0))
 
     np.testing.assert_allclose(echoes.range_m[:, 0], 1.73 / np.sin(down), rtol=1e-5)
     np.testing.assert_allclose(echoes.incidence_cos[:, 0], np.sin(down), rtol=1e-4)
@@ -80,13 +84,7 @@ def test_a_ground_plane_is_where_geometry_says() -> None:
 
 def test_nothing_beyond_the_reach_of_beams_is_hit() -> None:
     """Ranges are inf, labels and reflectance 0."""
-    rays = np.array([[0.0, 0.0, -1.0]], np.float32)
-    lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, 30.0)))
-    scene = Scene("plane", (Body("plane", "plane", instance_id=3),))
-    renderer = WarpRenderer(FakeLibrary(MESHES), "cpu")
-
-    near = renderer.scan(scene, lidar, LidarRays(rays, 0.0, 1, 29.0))
-    far = renderer.scan(scene, lidar, LidarRays(rays, 0.0, 1, 31.0))
+    near, far = (above_a_plane(30.0, LidarRays(DOWN, 0.0, 1, reach_m)) for reach_m in (29.0, 31.0))
 
     assert near.range_m[0, 0] == np.inf
     assert near.instance_id[0, 0] == 0 and near.reflectance[0, 0] == 0.0
@@ -96,13 +94,7 @@ def test_nothing_beyond_the_reach_of_beams_is_hit() -> None:
 
 def test_rays_of_a_wide_beam_surround_its_axis() -> None:
     """On a plane at normal incidence, the six rays end on the circle of half the beam's light."""
-    rays = np.array([[0.0, 0.0, -1.0]], np.float32)
-    lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, 10.0)))
-    scene = Scene("plane", (Body("plane", "plane"),))
-
-    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(
-        scene, lidar, LidarRays(rays, 0.2, 7, 120.0)
-    )
+    echoes = above_a_plane(10.0, LidarRays(DOWN, 0.2, 7, 120.0))
 
     slant_m = 10.0 * np.hypot(1.0, np.tan(0.1) / np.sqrt(2.0))
     np.testing.assert_allclose(echoes.range_m[0], [10.0, *[slant_m] * 6], rtol=1e-5)

@@ -156,7 +156,7 @@ def test_camera_and_lidar_see_the_same_world() -> None:
 
 
 def test_what_is_clear_to_the_eye_is_clear_to_a_laser() -> None:
-    """Without a role, transmission and opacity decide what passes; Fresnel what is reflected."""
+    """Without a role, transmission and opacity decide the passing light; Fresnel the mirrored."""
     white = np.ones(3)
     glass = Material((1, 1, 1), 0.04, transmission=0.75, ior=1.5)
     veil = Material((1, 1, 1), 1.0, opacity=0.25)

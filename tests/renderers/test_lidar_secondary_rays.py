@@ -14,7 +14,13 @@ from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.sensors.lidar.lidar_detection import received_light
 from gen_data.sensors.lidar.scan_pattern import lidar_model
 from tests.embree import RayCaster, placed
-from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, room_mesh
+from tests.renderers.fake_library import (
+    FakeLibrary,
+    box_mesh,
+    plane_mesh,
+    room_mesh,
+    scattered_pose,
+)
 
 GREY = Material((0.4, 0.4, 0.4), 1.0, specular=0.0)
 GLASS = Material((0.01, 0.01, 0.01), 0.05, role="glass")
@@ -28,10 +34,10 @@ AHEAD = np.array([[1.0, 0.0, 0.0]], np.float32)
 
 
 def scan(
-    scene: Scene, directions: np.ndarray, height_m: float = 0.0, subrays: int = 1
+    scene: Scene, directions: np.ndarray, height_m: float = 0.0, mirrored: bool = False
 ) -> LidarHits:
     lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, height_m)))
-    beams = LidarRays(np.asarray(directions, np.float32), 0.002, subrays, 200.0)
+    beams = LidarRays(np.asarray(directions, np.float32), 0.002, 1, 200.0, mirrored=mirrored)
     return WarpRenderer(LIBRARY, "cpu").scan(scene, lidar, beams)
 
 
@@ -41,7 +47,7 @@ def schlick(f0: float, angle_rad: float) -> float:
 
 
 def test_behind_a_pane_a_wall_is_seen_dimmed_on_both_ways() -> None:
-    """Its range is its own, its reflectance that of the wall times the pane's squared."""
+    """Its range is undisturbed, its reflectance the wall's times the pane's squared."""
     bodies = (
         Body("pane", "pane", SE3((10.0, 0.0, 0.0)), instance_id=1),
         Body("wall", "wall", SE3((15.1, 0.0, 0.0)), instance_id=2),
@@ -108,12 +114,9 @@ def test_requested_mirrored_objects_have_their_ids_and_true_places() -> None:
         Body("window", "window", turned, instance_id=1),
         Body("wall", "wall", SE3.about_z(math.radians(90.0), (10.0, -20.1, 0.0)), instance_id=2),
     )
-    beams = LidarRays(AHEAD, 0.0, 1, 200.0, mirrored=True)
-    pose = SE3((0.0, 0.0, 0.0))
-    lidar = Lidar("top", "color", T_world_lidar=pose)
     plain = scan(Scene("mirror", bodies[1:]), AHEAD).detours
-    shown = WarpRenderer(LIBRARY, "cpu").scan(Scene("mirror", bodies[1:]), lidar, beams).detours
-    both = WarpRenderer(LIBRARY, "cpu").scan(Scene("both", bodies), lidar, beams).detours
+    shown = scan(Scene("mirror", bodies[1:]), AHEAD, mirrored=True).detours
+    both = scan(Scene("both", bodies), AHEAD, mirrored=True).detours
 
     assert plain is not None and plain.mirrored_id is None and plain.mirrored_m is None
     assert shown is not None and shown.mirrored_id is not None and shown.mirrored_m is not None
@@ -139,13 +142,9 @@ def test_mirrored_objects_agree_with_embree(seed: int) -> None:
     library = FakeLibrary(meshes)
     bodies = [Body("hall", "hall", SE3((0.0, 0.0, -4.0)), instance_id=1)]
     for k in range(30):
-        q = rng.normal(size=4)
-        asset = ("window", "box")[k % 2]
-        place = tuple(float(v) for v in rng.uniform((-15, -15, -3), (15, 15, 7)))
-        if np.linalg.norm(place) < 4.0:
-            continue
-        pose = SE3(place, tuple(float(v) for v in q / np.linalg.norm(q)))
-        bodies.append(Body(f"b{k}", asset, pose, instance_id=k + 2))
+        pose = scattered_pose(rng, (-15, -15, -3), (15, 15, 7))
+        if np.linalg.norm(pose.translation_m) >= 4.0:
+            bodies.append(Body(f"b{k}", ("window", "box")[k % 2], pose, instance_id=k + 2))
     rays = rng.normal(size=(20_000, 3))
     rays = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)
     lidar = Lidar("top", "color", T_world_lidar=SE3())
@@ -167,7 +166,7 @@ def test_mirrored_objects_agree_with_embree(seed: int) -> None:
     expected = at[ray] + (second.distance[ray] + 1e-3)[:, None] * reflected[ray]
     same = detours.mirrored_id == ids[second.mesh[ray]]
     assert same.mean() >= 0.998
-    # A ray that grazes a surface meets it far from where one 2 mm beside it does.
+    # A ray that grazes a surface meets it far from where one 2 mm apart does.
     flat = np.abs(np.sum(second.normal * reflected, axis=1))[ray] > 0.2
     off_m = np.linalg.norm(detours.mirrored_m - expected, axis=1)[same & flat]
     assert off_m.max() < 0.015 and np.median(off_m) < 3e-3
@@ -196,7 +195,7 @@ def test_puddles_mirror_what_stands_behind_them() -> None:
 
 @pytest.mark.parametrize("down_deg", [5.0, 20.0, 60.0])
 def test_wet_asphalt_sends_back_less_and_least_aslant(down_deg: float) -> None:
-    """As Lekner and Dorf say; a film on half of it reflects its Fresnel share away, both ways."""
+    """By Lekner and Dorf; a film on half of it reflects its Fresnel share away, both ways."""
     down = math.radians(down_deg)
     ray = [[math.cos(down), 0.0, -math.sin(down)]]
     road = (Body("road", "road"),)

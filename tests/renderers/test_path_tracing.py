@@ -18,8 +18,8 @@ from tests.renderers.fake_library import (
     DARK,
     MATTE,
     FakeLibrary,
-    box_mesh,
     camera_at,
+    ground,
     plane_mesh,
     room_mesh,
     sphere_mesh,
@@ -52,14 +52,14 @@ def ball_in_furnace(**fields: object) -> np.ndarray:
     {"transmission": 1.0, "thin": True, "roughness": 0.0},
     {"transmission": 0.6, "thin": True, "roughness": 0.05, "opacity": 0.5},
 ], ids=str)  # fmt: skip
-def test_what_takes_no_light_is_invisible_in_a_uniform_environment(fields: dict) -> None:
+def test_materials_without_absorption_are_invisible_in_a_uniform_environment(fields: dict) -> None:
     """White furnace: radiance 100 in, 100 out, to 0.1 %, the error of the table of lobes."""
     means = ball_in_furnace(**fields).mean(axis=(1, 2, 3))
     error = means.std(ddof=1) / math.sqrt(len(means))
     assert abs(means.mean() - 100.0) < 4.0 * error + 0.1
 
 
-def test_rough_glass_loses_what_its_facets_hide_and_no_more() -> None:
+def test_rough_glass_loses_the_light_that_its_facets_hide_and_no_more() -> None:
     """Walter's model has no second scattering: never above one, and not far below."""
     image = ball_in_furnace(transmission=1.0, thin=False, roughness=0.4).mean(axis=0)
 
@@ -72,10 +72,6 @@ def test_a_grey_ball_under_an_even_sky_has_its_albedo() -> None:
     images = ball_in_furnace(base_color=(0.5, 0.25, 0.1), roughness=1.0, specular=0.0)
 
     np.testing.assert_allclose(images.mean(axis=(0, 1, 2)), (50.0, 25.0, 10.0), rtol=2e-3)
-
-
-def ground(material: Material = MATTE) -> FakeLibrary:
-    return FakeLibrary({"plane": plane_mesh(20.0, (material,)), "box": box_mesh()})
 
 
 def from_above(size_px: tuple[int, int] = (16, 12)) -> Camera:
@@ -208,7 +204,7 @@ def test_a_panel_that_a_body_shows_gives_its_light_once() -> None:
     np.testing.assert_allclose(floor.mean(), expected.mean(), rtol=0.01)
 
 
-def test_emission_shines_in_the_picture_and_on_what_is_near() -> None:
+def test_emission_shines_in_the_picture_and_on_its_surroundings() -> None:
     """A closed room that emits 10 cd/m^2 and reflects half: 10 + 5 + 2.5 ... = 20."""
     glowing = replace(MATTE, emission_cd_m2=(10.0, 10.0, 10.0))
     library = FakeLibrary({"room": room_mesh(materials=(glowing,))})
@@ -325,7 +321,7 @@ def test_both_tiers_agree_where_light_comes_straight_from_lamps() -> None:
     np.testing.assert_allclose(traced, drawn.channels[Channel.RADIANCE], rtol=0.01)
 
 
-def test_fog_dims_what_is_far() -> None:
+def test_fog_dims_distant_surfaces() -> None:
     """Koschmieder: exp(-0.2 * 3) of a lit floor remains, plus the fog's own light."""
     sun = Light("sun", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=1000.0)
     weather = Weather(fog_extinction_per_m=0.2)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from gen_data.core.asset_types import Material, TextureData
-from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Environment, Scene
-from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary, camera_at, plane_mesh
+from tests.renderers.images import drawn
 
 LIGHT = Environment(luminance_cd_m2=100.0)
 
@@ -24,11 +23,7 @@ def halves(tier: Literal["realtime", "pathtraced"], role: str, eye_z_m: float) -
     settings = RenderSettings(ambient_occlusion_radius_m=0.0, tier=tier, samples=16)
     camera = camera_at((0.0, -0.01, eye_z_m), (0.0, 0.0, 0.0))
     scene = Scene("t", (Body("sheet", "sheet"),), environment=LIGHT)
-    reading = WarpRenderer(library, "cpu", settings).render(
-        scene, camera, frozenset({Channel.RADIANCE})
-    )
-    image = reading.channels[Channel.RADIANCE][..., 1]
-    # The image's right is +x from above, and -x from below.
+    image = drawn(scene, camera, library, settings)[..., 1]
     # Both cameras have +x on the right.
     return np.array([float(image[24, 20]), float(image[24, 43])])
 

@@ -8,10 +8,10 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.realtime.realtime_shading import pixel_samples
-from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     DARK,
+    MATTE,
     FakeLibrary,
     box_mesh,
     camera_at,
@@ -19,13 +19,13 @@ from tests.renderers.fake_library import (
     plane_mesh,
     sphere_mesh,
 )
+from tests.renderers.images import OPEN, drawn, seen
 
 LIBRARY = FakeLibrary({"plane": plane_mesh(100.0), "box": box_mesh(), "ball": sphere_mesh(0.5)})
 
 
 def radiance_of(scene: Scene, camera: Camera, settings: RenderSettings | None = None) -> np.ndarray:
-    renderer = WarpRenderer(LIBRARY, "cpu", settings)
-    return renderer.render(scene, camera, frozenset({Channel.RADIANCE})).channels[Channel.RADIANCE]
+    return drawn(scene, camera, LIBRARY, settings or RenderSettings())
 
 
 def glowing(pose: SE3, asset: str = "box", scale: float = 1.0, emission: float = 100.0) -> Body:
@@ -33,39 +33,28 @@ def glowing(pose: SE3, asset: str = "box", scale: float = 1.0, emission: float =
     return Body("glow", asset, pose, scale, materials=(material,))
 
 
-@pytest.mark.parametrize("visibility", ["raster", "rays"])
-def test_an_edge_is_as_grey_as_it_is_covered(visibility: str) -> None:
-    """A quarter of a pixel on a glowing box of 300 cd/m^2 in front of black: 75 cd/m^2."""
-    left_m = (22.75 - 32.0) / 50.0 * 2.0
-    scene = Scene("t", (glowing(SE3((left_m + 0.5, 0.0, 2.5)), emission=300.0),), environment=DARK)
-    camera = forward_camera()
-
-    smooth = radiance_of(scene, camera, RenderSettings(visibility=visibility))[24, 20:25, 0]
-    rough = radiance_of(scene, camera, RenderSettings(antialias=1))[24, 20:25, 0]
-
-    np.testing.assert_allclose(rough, [0.0, 0.0, 0.0, 300.0, 300.0], rtol=1e-5)
-    np.testing.assert_allclose(smooth, [0.0, 0.0, 75.0, 300.0, 300.0], rtol=1e-5)
-
-
-@pytest.mark.parametrize("samples", [2, 4, 8])
-def test_half_a_pixel_is_half_as_bright_at_any_number_of_samples(samples: int) -> None:
-    """The left half of a pixel is black, its right half on a glowing box of 300 cd/m^2."""
-    left_m = (22.5 - 32.0) / 50.0 * 2.0
+@pytest.mark.parametrize(("share", "settings", "shown"), [
+    (0.25, {"antialias": 1}, 0.0), (0.25, {"visibility": "raster"}, 75.0),
+    (0.25, {"visibility": "rays"}, 75.0), *((0.5, {"antialias": k}, 150.0) for k in (2, 4, 8)),
+])  # fmt: skip
+def test_an_edge_is_as_grey_as_it_is_covered(
+    share: float, settings: dict[str, object], shown: float
+) -> None:
+    """A share of a pixel on a glowing box of 300 cd/m^2 in front of black."""
+    left_m = (23.0 - share - 32.0) / 50.0 * 2.0
     scene = Scene("t", (glowing(SE3((left_m + 0.5, 0.0, 2.5)), emission=300.0),), environment=DARK)
 
-    row = radiance_of(scene, forward_camera(), RenderSettings(antialias=samples))[24, 20:25, 0]
+    row = radiance_of(scene, forward_camera(), RenderSettings.model_validate(settings))[24]
 
-    np.testing.assert_allclose(row, [0.0, 0.0, 150.0, 300.0, 300.0], rtol=1e-5)
+    np.testing.assert_allclose(row[20:25, 0], [0.0, 0.0, shown, 300.0, 300.0], rtol=1e-5)
 
 
 def test_anti_aliasing_does_not_touch_labels() -> None:
-    """Ids and depth are those of pixel centres, with or without it."""
+    """Ids and depth belong to pixel centres, with or without it."""
     scene = Scene("t", (Body("b", "ball", SE3((0.1, 0.0, 2.0)), instance_id=3),))
-    wanted = frozenset({Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH})
+    wanted = (Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH)
     images = [
-        WarpRenderer(LIBRARY, "cpu", RenderSettings(antialias=n))
-        .render(scene, forward_camera(), wanted)
-        .channels
+        seen(scene, forward_camera(), LIBRARY, *wanted, settings=RenderSettings(antialias=n))
         for n in (1, 8)
     ]
 
@@ -76,7 +65,7 @@ def test_anti_aliasing_does_not_touch_labels() -> None:
 
 @pytest.mark.parametrize("n", [2, 4, 8])
 def test_parts_of_a_pixel_share_no_row_and_no_column(n: int) -> None:
-    """So that nearly upright and nearly level edges get n + 1 shades."""
+    """Nearly upright and nearly level edges get n + 1 shades."""
     parts = pixel_samples(n)
 
     for axis in range(2):
@@ -86,11 +75,11 @@ def test_parts_of_a_pixel_share_no_row_and_no_column(n: int) -> None:
 
 def test_nothing_shows_the_environment_or_black() -> None:
     """Pixels without a body show the sky's image if it is visible."""
-    seen = Scene("t", environment=Environment(luminance_cd_m2=300.0))
-    unseen = Scene("t", environment=Environment(luminance_cd_m2=300.0, visible=False))
+    shown = Scene("t", environment=Environment(luminance_cd_m2=300.0))
+    hidden = Scene("t", environment=Environment(luminance_cd_m2=300.0, visible=False))
 
-    np.testing.assert_allclose(radiance_of(seen, forward_camera()), 300.0, rtol=1e-5)
-    assert not radiance_of(unseen, forward_camera()).any()
+    np.testing.assert_allclose(radiance_of(shown, forward_camera()), 300.0, rtol=1e-5)
+    assert not radiance_of(hidden, forward_camera()).any()
     assert not radiance_of(Scene("t", environment=DARK), forward_camera()).any()
 
 
@@ -116,17 +105,15 @@ def test_radiance_grows_with_the_light() -> None:
 
 def test_a_corner_is_darker_than_the_open_floor() -> None:
     """Ambient occlusion: at the foot of a wall half of the sky is hidden, far from it none."""
-    matte = Material((0.5, 0.5, 0.5), 1.0, specular=0.0)
     bodies = (
-        Body("floor", "plane", materials=(matte,)),
-        Body("wall", "box", SE3((0.0, 1.0, 0.5)), materials=(matte,)),
+        Body("floor", "plane", materials=(MATTE,)),
+        Body("wall", "box", SE3((0.0, 1.0, 0.5)), materials=(MATTE,)),
     )
     scene = Scene("t", bodies, environment=Environment(luminance_cd_m2=300.0))
     camera = camera_at((0.0, 0.0, 3.0), (0.0, 0.01, 0.0), (24, 384), hfov_deg=1.6)
 
     shaded = radiance_of(scene, camera)[:, 12, 1]
-    flat = RenderSettings(ambient_occlusion_radius_m=0.0)
-    plain = radiance_of(scene, camera, flat)[:, 12, 1]
+    plain = radiance_of(scene, camera, OPEN)[:, 12, 1]
 
     # 286 px to the metre: the wall begins 143 px above the centre, row 192.
     foot = 192 - 143 + 4

@@ -76,7 +76,7 @@ def test_a_streak_along_columns_is_as_long_as_the_way(renderer: WarpRenderer) ->
 
 
 def test_labels_of_a_long_exposure_are_those_of_its_middle(renderer: WarpRenderer) -> None:
-    """Every label image and silhouette is that of an instant."""
+    """Every label image and silhouette shows an instant."""
     scene = passing(300.0, Shutter(exposure_s=0.05))
     long, instant = shot(renderer, scene), shot(renderer, without_shutter(scene))
 
@@ -173,7 +173,7 @@ def test_depth_of_what_approaches_is_that_of_each_row(renderer: WarpRenderer) ->
     track = even_track("wall", wall.T_world_body, (0.0, 0.0, -10.0))
     shutter = Shutter(0.0, 0.08)
     scene = world(wall, tracks=(track,), shutter=shutter, time_s=0.0)
-    # A corner moves by 57.7 px / 6 m * 10 m/s, so that a band lasts about 2.6 ms.
+    # A corner moves by 57.7 px / 6 m * 10 m/s, hence a band lasts about 2.6 ms.
     z_m = shot(renderer, scene).channels[Channel.Z_DEPTH]
 
     expected = 6.0 - 10.0 * shutter.row_delays_s(LENS.height_px)

@@ -1,4 +1,4 @@
-"""Texture sampling four pixels at a time gives what sampling each pixel alone gives."""
+"""Texture sampling four pixels at a time equals sampling each pixel alone."""
 
 import numpy as np
 import warp as wp

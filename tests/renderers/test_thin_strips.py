@@ -136,7 +136,7 @@ def test_the_rim_of_a_board_is_seen_between_pixel_centres_by_cameras_with_many_p
         reading = renderer.render(scene, rim_camera(), RADIANCE, find_tones)
         return reading.channels[Channel.RADIANCE][..., 1].sum(axis=0)[20:-20] / 100.0
 
-    # Far below white, the mean of tones is that of radiance.
+    # Far below white, the mean of tones is the mean of radiance.
     seen = columns(lambda _: Tones(1e6, 1e6))
 
     assert seen.mean() == pytest.approx(RIM_PX, rel=0.05)

@@ -1,6 +1,6 @@
-"""Things on photographs, against renderings of the whole scene.
+"""Objects on photographs, against renderings of the whole scene.
 
-The photograph is a rendering of the same ground without the things on it.
+The photograph is a rendering of the same ground without the objects on it.
 """
 
 import math
@@ -133,7 +133,7 @@ def test_a_cube_on_a_photograph_looks_as_in_the_whole_scene() -> None:
 
 
 def test_things_and_ground_have_labels_and_the_rest_has_none() -> None:
-    """Depth of the ground is known inside its corners; instances are those of the whole scene."""
+    """Depth of the ground is known inside its corners; instances are as in the whole scene."""
     ours, truth = composite().channels, whole().channels
     np.testing.assert_array_equal(ours[Channel.INSTANCE], truth[Channel.INSTANCE])
     known = np.isfinite(ours[Channel.Z_DEPTH])
@@ -188,7 +188,7 @@ def half_mask() -> NDArray[np.uint8]:
 
 
 def test_the_foreground_hides_exactly() -> None:
-    """Behind it are the photograph's pixels and no labels; beside it nothing changes."""
+    """Behind it are the photograph's pixels and no labels; elsewhere nothing changes."""
     left = slice(0, SIZE_PX[0] // 2)
     right = slice(SIZE_PX[0] // 2, None)
     hidden = seen(
@@ -243,7 +243,7 @@ def test_a_moving_thing_blurs_on_the_photograph() -> None:
     assert moving.any()
     assert (flow[moving][:, 0] < -1.0).all(), "to the left"
     still = np.abs(photographed(reading).astype(int) - empty_photo()).max(axis=-1) == 0
-    assert still[:20].all(), "what is above the cube stays as it is"
+    assert still[:20].all(), "pixels above the cube stay as they are"
     assert still.mean() > 0.5
 
 
@@ -261,7 +261,7 @@ def test_what_contradicts_the_photograph_is_refused() -> None:
 
 
 def test_the_path_traced_tier_agrees() -> None:
-    """Ground far from the cube is the photograph to a byte, its shadow that of the whole scene."""
+    """Ground far from the cube is the photograph to a byte, its shadow as in the whole scene."""
     given = {"tier": "pathtraced", "samples": 8, "max_bounces": 2}
     library = PlateLibrary(empty_photo())
     reading = seen(library, world(cube=True, photo=True), **given)

@@ -91,7 +91,7 @@ def luminance(reading: SensorReading) -> np.ndarray:
 
 
 def test_no_weather_changes_no_byte(renderer: WarpRenderer) -> None:
-    """A seed alone, or a fog height without fog, is no weather."""
+    """A seed alone, or a fog height without fog, does not count as weather."""
     light = (Environment(luminance_cd_m2=60.0), SUN)
     plain = renderer.render(street(Weather(), *light), AHEAD, RADIANCE).channels[Channel.RADIANCE]
     empty = Weather(seed=99, fog_height_m=50.0)
@@ -311,7 +311,7 @@ def test_small_poisson_numbers_have_the_right_mean_and_variance() -> None:
 
 
 def test_drops_fall_faster_than_flakes() -> None:
-    """Streaks of rain are several times longer than those of flakes."""
+    """Streaks of rain are several times longer than streaks of flakes."""
     streaks = make_streaks(rain(10.0), AHEAD, Weather(seed=1), 0.01, "rain")
     flakes = make_streaks(snow(1.0), AHEAD, Weather(seed=1), 0.01, "snow")
     lengths = [

@@ -167,7 +167,7 @@ def test_instances_count_from_one_in_the_order_of_creation(annotate: bool) -> No
 
 
 def test_hollow_props_and_backdrops_are_background_and_others_are_not() -> None:
-    """Cameras may be under a gantry, so that its bounding box must not count."""
+    """Cameras may be under a gantry: its bounding box must not count."""
     gantry = {"type": "prop", "name": "gantry", "asset": "gantry?size_m=1.6,1,1.8"}
     plinth = {"type": "prop", "name": "plinth", "asset": "pedestal?size_m=0.3,0.3,0.7"}
     backdrop = {"type": "backdrop", "name": "ground", "asset": "plane?size_m=6,6"}
@@ -180,7 +180,7 @@ def test_hollow_props_and_backdrops_are_background_and_others_are_not() -> None:
 
 
 def test_focus_is_the_air_over_what_carries_objects() -> None:
-    """The box over the table; the empty one beside it does not count."""
+    """The box over the table; the empty one next to it does not count."""
     scene = built(DESK, {**DESK, "name": "other", "at_m": (2.0, 0.0)}, clutter(count=2))
 
     assert scene.focus.center_m[:2] == (0.0, 0.0)
@@ -260,7 +260,7 @@ def test_an_impossible_lamp_is_refused_when_it_is_read(given: dict[str, object],
     ({"tags": ["household"], "exclude": ["can", "toy"]}, {"bottle", "brick"}),
 ])  # fmt: skip
 def test_assets_are_chosen_by_tags_and_ids(chosen: dict[str, Any], assets: set[str]) -> None:
-    """All tags, any tag, a family, single assets; less what is excluded."""
+    """All tags, any tag, a family, single assets; less the excluded ones."""
     assert set(built(DESK, clutter(assets=chosen, count=0)).groups[0].assets) == assets
 
 
@@ -273,7 +273,7 @@ def test_assets_are_chosen_by_tags_and_ids(chosen: dict[str, Any], assets: set[s
     ({**DESK, "height_m": 0.5}, r"elements\.table: two elements have this name"),
 ])  # fmt: skip
 def test_impossible_relations_are_told_with_their_place(line: dict[str, Any], message: str) -> None:
-    """One message naming the element, the fact and what was probably meant."""
+    """One message naming the element, the fact and the nearest name."""
     with pytest.raises(ConfigError, match=message):
         built(DESK, line)
 

@@ -174,7 +174,7 @@ def test_groups_may_use_only_the_outer_or_the_inner_lanes() -> None:
 
 @pytest.mark.slow
 def test_sections_differ_by_district() -> None:
-    """What each district is known for."""
+    """Typical traits of each district."""
     by_district = {key[0]: scene for key, scene in districts().items()}
     kinds = {
         name: {lane.kind for lane in scene.lanes if lane.road == "main"}

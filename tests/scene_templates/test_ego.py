@@ -50,7 +50,7 @@ def test_what_is_not_there_is_told(library: Library) -> None:
 
 
 def test_a_configuration_adds_an_element_that_its_template_lacks(tmp_path: Path) -> None:
-    """An entry with a type is an element of its own, after all others; without one, an error."""
+    """An entry with a type is a separate element, after all others; without one, an error."""
     text = "template: street\nrandomizers: []\nsensors: [{type: rgb_camera}]\n"
     (tmp_path / "more.yaml").write_text(text + "elements: {ego: {type: ego, tags: [car]}}\n")
     (tmp_path / "wrong.yaml").write_text(text + "elements: {ego: {tags: [car]}}\n")

@@ -63,7 +63,7 @@ def test_nothing_stands_in_the_space_of_vehicles_and_people(scene: Scene) -> Non
     for body in (body for body in scene.bodies if body.name.startswith("place/")):
         mesh = library().mesh(body.asset)
         if body.asset.startswith("tree"):
-            continue  # Crowns reach over sidewalks, as those of all street trees.
+            continue  # Crowns reach over sidewalks, as do all street trees.
         inverse = body.T_world_body.inverse()
         distance, face, _ = cast(mesh, inverse.apply(points), inverse.rotate(down))
         hit = np.array([f >= 0 for f in face])
@@ -71,7 +71,7 @@ def test_nothing_stands_in_the_space_of_vehicles_and_people(scene: Scene) -> Non
 
 
 def test_gardens_and_houses_leave_room(scene: Scene) -> None:
-    """Nothing solid of the place stands on what is left of the lanes of plants and houses."""
+    """Nothing solid of the place stands on the remainder of the lanes of plants and houses."""
     beside = [n for n in scene.lanes if n.kind in ("garden", "verge") and n.road == "main"]
     points = np.concatenate([np.array(lane.center_m)[:, :2] for lane in beside])
     for body in scene.bodies:
@@ -180,7 +180,7 @@ RAILS = Road(name="main", length_m=120.0, tram=True, lanes=(2, 2), median_m=3.0)
 
 
 def test_contact_wires_hang_over_the_tracks_between_poles() -> None:
-    """5.5 m over the middles of the inner lanes, without gaps; poles stand beside the lanes."""
+    """5.5 m over the middles of the inner lanes, without gaps; poles stand next to the lanes."""
     made = built(RAILS, TramLine(name="wires", road="main"))
     lanes = {lane.name: np.array(lane.center_m) for lane in made.lanes}
     wires = [b for b in made.bodies if b.name.endswith("/wires")]

@@ -1,4 +1,4 @@
-"""Streets: what stands along lanes, and signals at junctions."""
+"""Streets: objects along lanes, and signals at junctions."""
 
 import math
 

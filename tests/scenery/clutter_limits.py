@@ -28,7 +28,7 @@ CLUTTER = {
     "road_barrier": Limits((0.35, 0.9), (1.1, 2.6), (0.75, 1.5), 6),
     "construction_fence": Limits((0.6, 0.75), (3.4, 3.6), (1.9, 2.1), 4),
     "scaffold": Limits((0.7, 1.0), (2.5, 2.65), (6.5, 11.5), 4),
-    # A row of three bicycles, each as detailed as those with a rider.
+    # A row of three bicycles, each as detailed as one with a rider.
     "parked_bicycle": Limits((1.6, 2.0), (0.4, 2.1), (0.45, 1.25), 8, 8000),
     "kick_scooter": Limits((1.0, 1.2), (0.4, 1.3), (0.4, 1.25), 4),
     "trailer": Limits((3.2, 4.2), (1.4, 1.8), (0.8, 2.1), 4),

@@ -132,14 +132,14 @@ def test_the_front_faces_plus_x(built: tuple[str, int, Solid]) -> None:
 
 @for_some_of_every_style
 def test_walls_have_the_first_material_of_their_design(built: tuple[str, int, Solid]) -> None:
-    """What the variety of designs is counted by is what is built."""
+    """The materials by which the variety of designs is counted are built."""
     style, seed, solid = built
 
     assert solid.mesh.materials[0] == building_materials(draw_design(style, seed), seed)[0]
 
 
 def test_facts_name_style_and_floors() -> None:
-    """What labels carry agrees with what is built."""
+    """Labels agree with the built house."""
     facts = building_facts(3, "old_town")
 
     assert facts.subcategory == "old_town"

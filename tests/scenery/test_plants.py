@@ -29,7 +29,7 @@ def leaves_of(mesh: MeshData) -> np.ndarray:
 
 @pytest.mark.parametrize("species", sampled(LEAFY, 6))
 def test_leaves_come_and_go_but_the_trunk_stays(species: str) -> None:
-    """The share of leaves is what it says; the trunk of the same tree is the same."""
+    """The share of leaves is as stated; the trunk of the same tree is the same."""
     full, half, bare = summer_mesh(species), *(tree(1, species, k).mesh for k in (0.5, 0.0))
 
     assert leaves_of(half).sum() == pytest.approx(0.5 * leaves_of(full).sum(), abs=2)

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from gen_data.assets.families import own_families
 from gen_data.assets.family import Solid
 from gen_data.content.scenery import FAMILIES, TEXTURES
 from gen_data.core.errors import AssetError
 from tests.every_value import for_every
 from tests.scenery.clutter_limits import CLUTTER
-from tests.solids import assert_well_formed, build, digest, variant
+from tests.solids import variant
 from tests.tiers import first_and_all, sampled
 
 # Height range [m] of real ones, and the largest number of triangles that a street affords.
@@ -84,9 +83,10 @@ for_every_variant = for_every(
 """The first variants of every family."""
 
 
-def test_every_family_has_a_stated_height_and_budget() -> None:
-    """A new family must say how high the real thing is and what it may cost."""
+def test_every_family_has_a_stated_height_a_budget_and_facts() -> None:
+    """A new family must state the height of the real object and its largest cost."""
     assert set(LIMITS) == set(FAMILIES)
+    assert all(family.facts for family in FAMILIES.values())
 
 
 @first_and_all
@@ -103,7 +103,7 @@ def test_every_variant_is_as_high_as_real_ones_and_in_budget(name: str, how_many
 
 @for_every_variant
 def test_it_stands_on_the_ground_around_its_origin(built: tuple[str, Solid]) -> None:
-    """Nothing reaches below z = 0, something touches it, and the origin is under the thing."""
+    """Nothing reaches below z = 0, something touches it, and the origin is under it."""
     name, solid = built
     low, high = solid.mesh.bounds_m()
 
@@ -116,25 +116,14 @@ def test_it_stands_on_the_ground_around_its_origin(built: tuple[str, Solid]) -> 
 
 
 @for_every_variant
-def test_meshes_are_well_formed_and_use_every_slot(built: tuple[str, Solid]) -> None:
+def test_materials_are_used_and_dark_and_have_known_roles(built: tuple[str, Solid]) -> None:
+    """Randomizers look for roles."""
     mesh = built[1].mesh
 
-    assert_well_formed(mesh)
     assert set(mesh.face_slots.tolist()) == set(range(len(mesh.materials)))
-
-
-@for_every_variant
-def test_materials_have_known_roles_and_textures_that_exist(built: tuple[str, Solid]) -> None:
-    """Randomizers look for roles; a texture's family must be in one of the tables."""
-    textures = own_families()
-
-    assert textures
-    for material in built[1].mesh.materials:
+    for material in mesh.materials:
         assert material.role in ROLES
-        assert all(0.0 <= channel <= 1.0 for channel in material.base_color)
         assert material.emission_cd_m2 == (0.0, 0.0, 0.0)
-        if material.texture:
-            assert material.texture.partition("?")[0] in textures
 
 
 @for_every_variant
@@ -145,23 +134,6 @@ def test_collision_lies_within_the_mesh_bounds(built: tuple[str, Solid]) -> None
 
     assert (points >= np.array(low) - 0.1).all(), name
     assert (points <= np.array(high) + 0.1).all(), name
-
-
-@pytest.mark.slow
-@for_every(FAMILIES)
-def test_a_variant_has_the_same_bytes_every_time_and_others_than_its_neighbour(name: str) -> None:
-    assert digest(variant(name, 1)) == digest(build(name, 1))
-    assert digest(variant(name, 1)) != digest(variant(name, 2))
-
-
-@for_every(FAMILIES)
-def test_facts_are_known_without_building(name: str) -> None:
-    family = FAMILIES[name]
-    assert family.facts is not None
-    for seed in range(family.variants):
-        facts = family.facts(seed=seed, **family.parameters)
-        assert facts.subcategory
-        assert all(isinstance(value, str) for value in facts.attributes.values())
 
 
 @pytest.mark.parametrize(("name", "parameters"), [

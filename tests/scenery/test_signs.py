@@ -16,7 +16,7 @@ SHOWS = {
     "pedestrian_crossing": ("blue white black", "red yellow"),
     "one_way": ("blue white", "red yellow black"),
 }  # fmt: skip
-# Prototype colours [8-bit sRGB]: the middle of what the words mean.
+# Prototype colours [8-bit sRGB]: the middle of the words' meaning.
 WORDS = {
     "red": (190, 30, 25), "blue": (10, 85, 140), "yellow": (240, 200, 10),
     "black": (35, 35, 35), "white": (240, 240, 235),
@@ -45,7 +45,7 @@ def contains(outline: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", SHOWS)
 def test_a_sign_has_its_standard_colours_and_no_others(name: str) -> None:
-    """More than 3 % of the plate each; what it must not show stays below 2.5 %."""
+    """More than 3 % of the plate each; other colours stay below 2.5 %."""
     shown, absent = SHOWS[name]
     share = shares(name)
 

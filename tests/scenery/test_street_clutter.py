@@ -17,7 +17,7 @@ from tests.scenery.clutter_limits import CLUTTER
 ACROSS = (
     "fence", "garden_wall", "road_barrier", "construction_fence", "scaffold", "skip_container",
 )  # fmt: skip
-"""Families that run along Y, beside a street."""
+"""Families that run along Y, next to a street."""
 ALONG = ("parked_bicycle", "kick_scooter", "trailer", "dog", "pram")
 """Families that point along X, as vehicles do."""
 
@@ -31,7 +31,7 @@ def test_the_families_tagged_as_clutter_are_those_of_the_table() -> None:
 
 @pytest.mark.parametrize("name", tiers.sampled(CLUTTER, 5))
 def test_every_variant_is_as_long_and_wide_as_real_ones(name: str) -> None:
-    """Extents along X and Y; heights and triangles are those of all scenery."""
+    """Extents along X and Y; heights and triangles are checked for all scenery."""
     limits = CLUTTER[name]
     assert FAMILIES[name].variants >= limits.variants
     for seed in range(min(8, FAMILIES[name].variants)):
@@ -44,7 +44,7 @@ def test_every_variant_is_as_long_and_wide_as_real_ones(name: str) -> None:
 
 @pytest.mark.parametrize("name", tiers.sampled(CLUTTER, 5))
 def test_all_variants_differ(name: str) -> None:
-    """No two seeds that are offered for selection are the same thing."""
+    """No two seeds that are offered for selection are the same object."""
     seeds = range(FAMILIES[name].variants)
 
     assert len({solids.digest(solids.variant(name, seed)) for seed in seeds}) == len(seeds)
@@ -69,7 +69,7 @@ def test_pieces_extend_along_the_axis_of_their_kind(name: str) -> None:
 
 
 def test_cables_of_different_poles_meet_at_mid_span() -> None:
-    """Every variant's cables end at the same places, so that any two poles join."""
+    """Every variant's cables end at the same places: any two poles join."""
     half = 20.0
     ends = [cable_ends(utility_pole(seed, 2 * half), half) for seed in range(6)]
 

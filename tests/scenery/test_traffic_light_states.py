@@ -1,4 +1,4 @@
-"""Traffic lights: what is lit, how often, and never green for both."""
+"""Traffic lights: lit lenses, their frequency, and never green for both."""
 
 import math
 from collections.abc import Callable

@@ -19,7 +19,7 @@ def points_of(mesh: MeshData, role: str) -> np.ndarray:
 
 
 def test_some_carry_bags_of_several_colours() -> None:
-    """About two thirds; backpacks are above the saddle, panniers beside the rear wheel."""
+    """About two thirds; backpacks are above the saddle, panniers next to the rear wheel."""
     bags = [points_of(mesh, "canvas") for mesh in VARIANTS]
     floors = [mesh.bounds_m()[0][2] for mesh in VARIANTS]
     carried = [(b, z) for b, z in zip(bags, floors, strict=True) if len(b)]
@@ -47,7 +47,7 @@ def test_racing_bicycles_have_no_panniers() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_who_waits_has_one_foot_on_the_ground(seed: int) -> None:
-    """The left one, beside the bicycle; the other one is on a pedal; heads are below a rider's."""
+    """The left one, next to the bicycle; the other one is on a pedal; heads are below a rider's."""
     mesh = cyclist(seed, "wait").mesh
     shoes = points_of(mesh, "shoes")
     left, right = shoes[shoes[:, 1] > 0.0], shoes[shoes[:, 1] < 0.0]

@@ -1,4 +1,4 @@
-"""Licence plates: what is on them, where they are, who has which."""
+"""Licence plates: texts, places, and vehicles that carry them."""
 
 import re
 
@@ -30,7 +30,7 @@ def face(seed: int, rows: int = 1, country: str = "gb") -> np.ndarray:
 
 
 def test_plates_have_six_to_eight_letters_and_digits_all_of_which_differ() -> None:
-    """Of those that cannot be taken for another; strokes are on the grid of 4 by 6."""
+    """Letters that cannot be mistaken for another; strokes are on the grid of 4 by 6."""
     texts = [plate_text(seed) for seed in range(SEEDS)]
 
     assert all(re.fullmatch(r"[A-HJ-NPR-Z0-9 -]{7,9}", text) for text in texts)
@@ -127,7 +127,7 @@ def test_texts_have_the_order_of_letters_and_digits_of_their_country(country: st
 
 
 def test_british_plates_are_yellow_behind_and_white_in_front() -> None:
-    """Those of Germany are white on both sides, with a blue field at the left border."""
+    """German ones are white on both sides, with a blue field at the left border."""
     build = TEXTURES["licence_plate"].build
     front, rear = (
         build(seed=1, rows=1, country="gb", rear=k).albedo[6, 128].astype(int) for k in (0, 1)

@@ -16,7 +16,7 @@ from gen_data.content.vehicles.vehicle_materials import COLORS, draw_paint
 from gen_data.core.variant_rng import variant_rng
 from tests.every_value import for_every
 from tests.scenery.rays import cast
-from tests.solids import Array, assert_well_formed, build, digest, variant, with_role
+from tests.solids import Array, variant, with_role
 from tests.tiers import first_and_all
 
 FAMILIES = {name: family for name, family in VEHICLES.items() if name != "tram"}
@@ -73,7 +73,7 @@ def test_every_variant_is_as_big_as_real_ones_and_in_budget(name: str, how_many:
         low, high = built.body_bounds_m or mesh.bounds_m()
         painted = with_role(mesh, "paint")
         side = np.abs(painted[..., 1])
-        # Mirror housings are painted too: what is beside the body's middle tells its width.
+        # Mirror housings are painted too: the width is measured at the body's middle.
         body = side[np.abs(painted[..., 0]) < 0.1 * (high[0] - low[0])]
         assert lengths[0] <= high[0] - low[0] <= lengths[1], seed
         assert heights[0] <= high[2] <= heights[1], seed
@@ -240,11 +240,6 @@ def test_nothing_inside_sticks_out(name: str, seed: int) -> None:
 
 
 @for_every_variant
-def test_meshes_are_well_formed(built: tuple[str, Solid]) -> None:
-    assert_well_formed(built[1].mesh)
-
-
-@for_every_variant
 def test_collision_is_a_few_boxes_around_the_body(built: tuple[str, Solid]) -> None:
     """At most three parts that cover the mesh but for mirrors and handlebars."""
     solid = built[1]
@@ -275,15 +270,6 @@ def test_steering_turns_the_front_wheels_alone(name: str) -> None:
     assert np.array_equal(before[before[:, 0] < 0], after[after[:, 0] < 0])
     assert np.array_equal(with_role(straight.mesh, "paint"), with_role(turned.mesh, "paint"))
     assert straight.keypoints == turned.keypoints
-
-
-@pytest.mark.slow
-@for_every(FAMILIES)
-def test_same_seed_makes_the_same_bytes_and_others_do_not(name: str) -> None:
-    digests = [digest(variant(name, seed)) for seed in range(_few(name))]
-
-    assert digest(build(name, 0)) == digests[0]
-    assert len(set(digests)) == len(digests)
 
 
 def test_body_styles_are_all_offered_and_told_without_building() -> None:
@@ -397,7 +383,7 @@ def test_text_on_the_sides_reads_from_left_to_right() -> None:
 MIRROR_M = {
     **dict.fromkeys(FROM_CARS, 0.25), "truck": 0.2, "fire_engine": 0.2, "bus": 0.3, "tractor": 0.3,
 }  # fmt: skip
-"""Width of both mirrors beside the body: at least this [m]."""
+"""Width of both mirrors next to the body: at least this [m]."""
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -427,5 +413,5 @@ def test_the_body_is_as_wide_as_registered_and_leaves_out_mirrors_only(name: str
         assert body_low[2] == low[2] and body_low[0] == low[0]
         # Rods of antennas are 0.2 m high.
         assert 0.0 <= high[2] - body_high[2] <= (0.25 if name in FROM_CARS else 0.0)
-        # Only those of buses hang in front.
+        # Only mirrors of buses hang in front.
         assert (body_high[0] < high[0]) == (name == "bus")
