@@ -290,7 +290,7 @@ class RobotModel:
 
 @dataclass(frozen=True, slots=True)
 class AssetFacts:
-    """What labels state of an object besides its category.
+    """Further facts about an object for its labels, next to the category.
 
     Attributes:
         subcategory: A finer name than the category (``hatchback``, ``child``); may be empty.
@@ -315,7 +315,7 @@ class Asset:
         mass_kg: Nominal mass; 0 = unknown.
         sha256: Content hash of the files or of the generator's version and parameters.
         stackable: Flat above and below: may be stacked.
-        facts: Returns what labels state besides. Finding the facts of all objects that a street can
+        facts: Finds further facts for labels. Finding the facts of all objects that a street can
             have takes 0.3 s, and few of them are asked for.
     """
 

@@ -46,7 +46,7 @@ def test_libraries_of_a_process_share_descriptions_of_offered_assets(tmp_path: P
 
 
 def test_search_finds_no_facts_that_nobody_asks_for(tmp_path: Path) -> None:
-    """Those of all people and vehicles of a street take a third of a second."""
+    """Facts of all people and vehicles of a street take a third of a second."""
     asked: list[int] = []
 
     def find_facts(seed: int) -> Facts:

@@ -19,7 +19,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
 from gen_data.annotations.annotate import Thresholds
-from gen_data.core.asset_types import Symmetry
+from gen_data.core.asset_types import AssetFacts, Symmetry
 from gen_data.core.errors import AssetError
 from gen_data.core.scene import Articulation
 from gen_data.core.se3 import IDENTITY, SE3
@@ -298,7 +298,8 @@ class OneCube:
         self._props, self._symmetries = Props(), symmetries
 
     def get(self, asset_id: str) -> Any:
-        return replace(self._props.get(asset_id), symmetries=self._symmetries)
+        facts = AssetFacts(symmetries=self._symmetries)
+        return replace(self._props.get(asset_id), facts=lambda: facts)
 
     def mesh(self, asset_id: str) -> Any:
         return self._props.mesh(asset_id)

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gen_data.assets.library import Library
+from gen_data.core.asset_types import AssetFacts
 from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.exporters.rigid_models import Model, Piece, build_model
 from gen_data.exporters.symmetry_search import Samples, find_symmetries, sample_triangles
@@ -98,7 +99,7 @@ def test_what_assets_state_is_found_without_them(library: Library) -> None:
 
             @staticmethod
             def get(asset_id: str) -> Any:
-                return replace(library.get(asset_id), symmetries=())
+                return replace(library.get(asset_id), facts=AssetFacts)
 
         found = build_model((Piece(asset, 1.0, IDENTITY),), Silent()).info  # type: ignore[arg-type]
         assert len(found["symmetries_discrete"]) == len(stated), asset

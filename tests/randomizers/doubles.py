@@ -7,7 +7,16 @@ from itertools import combinations, product
 import numpy as np
 
 from gen_data.assets.asset_ids import parse_asset_id
-from gen_data.core.asset_types import Asset, Float32, Gripper, Joint, Keypoint, Material, RobotModel
+from gen_data.core.asset_types import (
+    Asset,
+    AssetFacts,
+    Float32,
+    Gripper,
+    Joint,
+    Keypoint,
+    Material,
+    RobotModel,
+)
 from gen_data.core.errors import AssetError, did_you_mean
 from gen_data.core.plates import Plate, upright_pose
 from gen_data.core.scene import Body, ObjectGroup, Scene, SupportSurface
@@ -102,7 +111,8 @@ class FakeAssets:
             return _asset(asset_id, "plate", "", ("rendered",))
         family = parse_asset_id(asset_id).name
         if family == "walker":
-            return replace(_asset(asset_id, "object", "person", ()), attributes=(("pose", "walk"),))
+            walks = AssetFacts(attributes=(("pose", "walk"),))
+            return replace(_asset(asset_id, "object", "person", ()), facts=lambda: walks)
         if family in FURNITURE_M:
             return _asset(asset_id, "object", family, ("furniture",))
         if family == "two_link":

@@ -209,8 +209,8 @@ def test_triangles_that_share_an_edge_neither_overlap_nor_leave_a_gap() -> None:
 def test_depth_of_slivers_is_that_of_their_plane() -> None:
     """Ground 1.5 m below the camera, of triangles 38 m long and millimetres to centimetres wide.
 
-    Snapping leaves centres of pixels outside of the slivers drawn there: depth is that of the plane
-    within 1/256 px up or down, and never that of a far corner.
+    Snapping leaves centres of pixels outside of the slivers drawn there: the plane has their
+    depth within 1/256 px up or down, a far corner never has.
     """
     rng = np.random.default_rng(5)
     right_m = np.cumsum(rng.uniform(0.001, 0.02, 1600)) - 8.0

@@ -97,7 +97,7 @@ class LidarModel(Strict):
 
     Attributes:
         name: Its name in labels; empty = the name of its file.
-        elevations_deg: Elevation of every laser in any order, such as that of firing, or blocks of
+        elevations_deg: Elevation of every laser in any order, such as firing order, or blocks of
             lasers from the top; none for a rosette scanner. Rings are numbered from the top.
         azimuth_offsets_deg: Offsets of the lasers to the left, one for each in the order of
             elevations_deg; fewer are repeated down the table.
