@@ -44,7 +44,7 @@ class BoundMaterial:
         uv_name: Primvar of its texture coordinates.
         uv_matrix: Affine map [2, 3] of the texture coordinates.
         color_name: Primvar that is its colour; empty = it has a colour.
-        transfers: Functions of the images whose values are not their texels times a factor, by attribute.
+        transfers: Functions of images whose values are not texels times a factor, by attribute.
         unused: Unused contents of the material.
     """
 
