@@ -6,6 +6,7 @@ The same scene without relief tells how high a lane or a wheel is above level gr
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 
 from gen_data.assemble.config import Config, load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
-from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.lane_geometry import SIDES, LaneLine, border_line
 from gen_data.core.scene import Lane
+from gen_data.core.se3 import Vec3
 from tests.street_ground import Street, wheels_m
 from tests.streets import thin_street
 
@@ -105,6 +107,41 @@ def test_lanes_of_motorways_climb_with_their_ground(highway: Pair) -> None:
     _check_lanes(highway, "motorway", 4)
     heights = [point[2] for lane in highway[0].scene.lanes for point in lane.center_m]
     assert 12.0 < np.ptp(heights) < 18.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("where", "road"),
+    [("highway", "motorway"), ("lot", "lot"), ("bent_lot", "lot"), ("crossing", "left")],
+)
+def test_borders_of_lanes_lie_on_the_ground(
+    where: str, road: str, request: pytest.FixtureRequest
+) -> None:
+    """As high as on level ground within 15 mm, which straight pieces across planes of 4 m take."""
+    here, level = request.getfixturevalue(where)
+    flat = {lane.name: lane for lane in level.scene.lanes}
+    heights = []
+    for lane in here.scene.lanes:
+        if lane.kind not in ("driving", "parking") or lane.road != road:
+            continue
+        for side in SIDES:
+            lines = [_points_on(border_line(one, side)) for one in (lane, flat[lane.name])]
+            gap_m, flat_gap_m = (
+                points[:, 2] - street.ground_m(points)
+                for street, points in zip((here, level), lines, strict=True)
+            )
+            np.testing.assert_allclose(gap_m, flat_gap_m, atol=0.015, err_msg=f"{lane.name} {side}")
+            heights += lines[0][:, 2].tolist()
+    assert np.ptp(heights) > 0.02
+
+
+def _points_on(line: Sequence[Vec3]) -> Array:
+    """40 places [40, 3] along a line in space, evenly spread in plan."""
+    points = np.array(line)
+    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    at = np.concatenate([[0.0], np.cumsum(steps)])
+    to = np.linspace(0.02, 0.98, 40) * at[-1]
+    return np.column_stack([np.interp(to, at, points[:, k]) for k in range(3)])
 
 
 @pytest.mark.slow

@@ -75,6 +75,47 @@ def face_viewer(n: wp.vec3, d_world: wp.vec3):
     return m
 
 
+@wp.func
+def nearest_on_edge(a: wp.vec3, b: wp.vec3):
+    """Share of the way from a to b, and squared distance, of the point nearest to the origin."""
+    edge = b - a
+    square = wp.dot(edge, edge)
+    share = wp.clamp(-wp.dot(a, edge) / wp.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    nearest = a + edge * share
+    return wp.vec2(share, wp.dot(nearest, nearest))
+
+
+@wp.func
+def across_ray(p: wp.vec3, way: wp.vec3):
+    """The part of a vector perpendicular to a unit direction."""
+    return p - way * wp.dot(p, way)
+
+
+@wp.func
+def weight_beside(world: records.World, hit: wp.vec2i, d: wp.vec3):
+    """Barycentric weights (u, v) of the point on a face nearest to a camera-frame ray beside it.
+
+    Weights clamped one by one would be those of a far corner where the ray misses a sliver.
+    """
+    b = hit[0]
+    g = world.bodies[b].geometry
+    corner = records.face_vertices(world, g, hit[1])
+    eye = world.bodies[b].eye_mesh
+    way = wp.normalize(world.bodies[b].B_mesh_camera @ d)
+    p0 = across_ray(records.vertex_at(world, g, corner[0]) - eye, way)
+    p1 = across_ray(records.vertex_at(world, g, corner[1]) - eye, way)
+    p2 = across_ray(records.vertex_at(world, g, corner[2]) - eye, way)
+    first = nearest_on_edge(p0, p1)
+    second = nearest_on_edge(p1, p2)
+    third = nearest_on_edge(p2, p0)
+    weight = wp.vec2(first[0], 0.0)
+    if second[1] < first[1] and second[1] <= third[1]:
+        weight = wp.vec2(1.0 - second[0], second[0])
+    elif third[1] < first[1]:
+        weight = wp.vec2(0.0, 1.0 - third[0])
+    return weight
+
+
 @wp.struct
 class Point:
     """A point of a face at a point of the image; fields as ``resolve`` stores them."""
@@ -91,9 +132,13 @@ def point_at(view: records.View, world: records.World, hit: wp.vec2i, x_px: floa
     d = records.pixel_direction(view, x_px, y_px)
     det = wp.dot(d, facet.across)
     inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
-    # Subpixel rays may miss the face: clamped to its edge, whose attributes are defined.
-    u = wp.clamp(wp.dot(d, facet.along_u) * inverse, 0.0, 1.0)
-    v = wp.clamp(wp.dot(d, facet.along_v) * inverse, 0.0, 1.0 - u)
+    u = wp.dot(d, facet.along_u) * inverse
+    v = wp.dot(d, facet.along_v) * inverse
+    if u < 0.0 or v < 0.0 or u + v > 1.0:
+        # Subpixel rays may miss the face: moved to its edge, whose attributes are defined.
+        weight = weight_beside(world, hit, d)
+        u = weight[0]
+        v = weight[1]
     side = wp.where(det < 0.0, -1.0, 1.0)
     d_world = view.R_world_camera @ d
     point = Point()
@@ -141,9 +186,10 @@ def resolve(
                 v = wp.dot(d, facet.along_v) * inverse
                 z = facet.depth * inverse
                 if u < 0.0 or v < 0.0 or u + v > 1.0:
-                    # Snapping moved an edge across this pixel's centre: clamp to the triangle.
-                    u = wp.clamp(u, 0.0, 1.0)
-                    v = wp.clamp(v, 0.0, 1.0 - u)
+                    # Snapping moved an edge across this pixel's centre.
+                    weight = weight_beside(world, hit, d)
+                    u = weight[0]
+                    v = weight[1]
                     z = facet.z_m[0] * (1.0 - u - v) + facet.z_m[1] * u + facet.z_m[2] * v
                     if view.lens != records.PINHOLE:
                         z = distance_to(world, hit, wp.vec2(u, v))
