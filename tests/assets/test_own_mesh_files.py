@@ -418,3 +418,33 @@ def test_hostile_3mf_is_one_clear_error(tmp_path: Path, model: str, reason: str)
         archive.writestr("3D/3dmodel.model", model)
     with pytest.raises(AssetError, match=reason):
         opened(tmp_path, root).mesh("user/a")
+
+
+BOX = [(x, y, z) for x in (0, 1) for y in (0, 2) for z in (0, 5)]
+FACES = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+
+
+def box_obj(scale: float, order: tuple[int, int, int] = (0, 1, 2), shift: float = 0.0) -> str:
+    rows = [[scale * corner[k] + shift for k in order] for corner in BOX]
+    return "".join(f"v {x} {y} {z}\n" for x, y, z in rows) + FACES
+
+
+@pytest.mark.parametrize(("collision", "size"), [
+    (box_obj(1000.0), "1000 x 2000 x 5000 m"),
+    (box_obj(0.001), "0.001 x 0.002 x 0.005 m"),
+    (box_obj(1.0, (2, 1, 0)), "5 x 2 x 1 m"),
+    (box_obj(1.0, shift=20.0), "1 x 2 x 5 m"),
+])  # fmt: skip
+def test_a_collision_mesh_of_another_unit_or_axes_or_place_is_refused(
+    tmp_path: Path, collision: str, size: str
+) -> None:
+    """In millimetres, in kilometres, with X upwards, and 20 m away."""
+    (tmp_path / "a.obj").write_text(box_obj(1.0))
+    (tmp_path / "c.obj").write_text(collision)
+    entry = MeshEntry(file="a.obj", collision="c.obj")
+    fact = rf"c\.obj: it is {size} large or elsewhere than a\.obj, of 1 x 2 x 5 m"
+    with pytest.raises(AssetError, match=fact):
+        import_object(Folder(tmp_path), entry, "user/a")
+    # A simpler part of it is a usual collision mesh.
+    (tmp_path / "c.obj").write_text(box_obj(0.4))
+    assert import_object(Folder(tmp_path), entry, "user/a").collision is not None
