@@ -35,7 +35,7 @@ from gen_data.core.scene import Lane
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.roads import opendrive, opendrive_lanes
 
-VERSION = 9
+VERSION = 10
 """Increased whenever the same files are imported as different geometry."""
 ROADS_VERSION = 1
 """The same for road networks."""
@@ -136,6 +136,8 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     mesh = normal_form(soup, place, max_faces=budget)
     if collides:
         solid = join_soups(collides).transformed(matrix).transformed(scaling)
+        if entry.collision:
+            _check_collision(solid, soup, f"{folder.root / entry.collision}", entry.file)
         check_coordinates(solid, place)
     else:
         # Decimated, to keep decomposition fast.
@@ -153,6 +155,29 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         (x + 0.0, y + 0.0, z + 0.0),
         remarks,
     )
+
+
+def _check_collision(solid: TriangleSoup, seen: TriangleSoup, place: str, file: str) -> None:
+    """Raise AssetError if collision geometry has another unit or other axes than its object.
+
+    It may be larger by half the object's extent, and much smaller.
+    """
+    low, high, inner_low, inner_high = (
+        getattr(soup.corners.reshape(-1, 3), end)(axis=0)
+        for soup in (seen, solid)
+        for end in ("min", "max")
+    )
+    extent = float((high - low).max())
+    beyond = max((low - inner_low).max(), (inner_high - high).max()) > 0.5 * extent
+    if beyond or float((inner_high - inner_low).max()) < 0.05 * extent:
+        given, wanted = (
+            " x ".join(f"{edge:.4g}" for edge in edges)
+            for edges in (inner_high - inner_low, high - low)
+        )
+        raise AssetError(
+            f"{place}: it is {given} m large or elsewhere than {file}, of {wanted} m, with the "
+            "unit and axes of that file; export both alike"
+        )
 
 
 def _remarks_of(file: str, unused: tuple[str, ...]) -> tuple[FileRemarks, ...]:
@@ -247,7 +272,7 @@ def _read_geometry(
     collides: list[TriangleSoup] = []
     if is_description(entry.file):
         thing = read_description(folder, entry.file)
-        poses = thing.poses_at_zero()
+        poses = thing.poses_at_rest()
         visuals = [(s, poses[n]) for n, link in thing.links.items() for s in link.visuals]
         solids = [(s, poses[n]) for n, link in thing.links.items() for s in link.collisions]
         if not visuals:

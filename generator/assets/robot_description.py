@@ -115,12 +115,28 @@ class RobotDescription:
             sorted({f for s in shapes for f in (s.file, s.look.texture) if f} | {*self.included})
         )
 
-    def poses_at_zero(self) -> dict[str, SE3]:
-        """``T_root_link`` of every link with all joints at position 0."""
+    def poses_at_rest(self) -> dict[str, SE3]:
+        """``T_root_link`` of every link, as a rigid object.
+
+        Joints are at 0, or in the middle of limits that exclude 0; those that mimic others follow.
+        """
+        free = {j.name: rest_position(j) for j in self.joints if j.movable and not j.mimic}
+        movable = [joint.name for joint in self.joints if joint.movable]
+        positions = dict(zip(movable, kinematics.positions_of(self.joints, free), strict=True))
         poses = {next(iter(self.links)): SE3()}
         for joint in self.joints:
-            poses[joint.child] = poses[joint.parent] @ joint.T_parent_joint
+            pose = poses[joint.parent] @ joint.T_parent_joint
+            position = positions.get(joint.name, 0.0)
+            if position:
+                turned = kinematics.joint_transform(joint, position)
+                pose = (pose @ turned).rounded(_DECIMALS)
+            poses[joint.child] = pose
         return poses
+
+
+def rest_position(joint: asset_types.Joint) -> float:
+    """Position [rad or m] of a joint that nothing sets: 0, or the middle of its limits."""
+    return 0.0 if joint.lower <= 0.0 <= joint.upper else 0.5 * (joint.lower + joint.upper)
 
 
 class MisplacedJoint(ValueError):

@@ -5,7 +5,7 @@ from itertools import combinations
 
 from gen_data.assets import asset_folder, robot_formats, robot_tools
 from gen_data.assets.folder_index import RobotEntry
-from gen_data.assets.robot_description import RobotDescription
+from gen_data.assets.robot_description import RobotDescription, rest_position
 from gen_data.core import errors, kinematics, se3
 from gen_data.core.asset_types import Gripper, RobotModel
 
@@ -75,9 +75,7 @@ def _home_positions(
             position that contradicts its leader's.
     """
     movable = [joint for joint in described.joints if joint.movable]
-    middles = ((j, 0.5 * (j.lower + j.upper)) for j in movable)
-    middle = {j.name: 0.0 if j.lower <= 0.0 <= j.upper else m for j, m in middles}
-    wanted = {**middle, **described.home, **entry.home}
+    wanted = {**{j.name: rest_position(j) for j in movable}, **described.home, **entry.home}
     given = {j.name: wanted[j.name] for j in movable if not j.mimic}
     positions = kinematics.positions_of(described.joints, given)
     for joint, position in zip(movable, positions, strict=True):

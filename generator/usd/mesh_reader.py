@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import polygon_triangles
 from gen_data.core.errors import AssetError
 from gen_data.core.se3 import Array
 from gen_data.usd.material_reader import PLAIN, BoundMaterial, read_bound_material
@@ -67,7 +68,7 @@ def read_mesh_prim(prim: Any, place: str) -> MeshPrim:
     where = f"{place}: {prim.GetPath()}"
     mesh, time = UsdGeom.Mesh(prim), Usd.TimeCode.EarliestTime()
     points = np.array(mesh.GetPointsAttr().Get(time) or [], dtype=np.float64).reshape(-1, 3)
-    topology = _read_topology(mesh, len(points), where)
+    topology = _read_topology(mesh, points, where)
     slots, materials = _read_materials(prim, topology.polygons, place)
     face_slots = slots[topology.polygon]
     read = MeshPrim(
@@ -144,23 +145,18 @@ def _paint(prim: Any, mesh: MeshPrim, topology: _Topology) -> MeshPrim:
     )
 
 
-def _read_topology(mesh: Any, point_count: int, where: str) -> _Topology:
+def _read_topology(mesh: Any, positions: Array, where: str) -> _Topology:
     from pxr import Usd, UsdGeom
 
     time = Usd.TimeCode.EarliestTime()
     counts = np.array(mesh.GetFaceVertexCountsAttr().Get(time) or [], dtype=np.int64)
     points = np.array(mesh.GetFaceVertexIndicesAttr().Get(time) or [], dtype=np.int64)
     fits = len(counts) and counts.min() >= 3 and counts.sum() == len(points)
-    if not fits or points.min() < 0 or points.max() >= point_count:
+    if not fits or points.min() < 0 or points.max() >= len(positions):
         raise AssetError(f"{where}: its faces and points are inconsistent; export it again")
-    starts = np.cumsum(counts) - counts
-    first = np.repeat(starts, counts - 2)
-    sizes = counts - 2
-    step = np.arange(int(sizes.sum())) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    fans = np.stack([first, first + step + 1, first + step + 2], axis=1)
+    fans, polygon = polygon_triangles.split_polygons(counts, positions[points])
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         fans = fans[:, ::-1]
-    polygon = np.repeat(np.arange(len(counts)), sizes)
     seen = ~np.isin(polygon, np.array(mesh.GetHoleIndicesAttr().Get(time) or [], dtype=np.int64))
     owners = np.repeat(np.arange(len(counts)), counts)
     return _Topology(points, fans[seen], polygon[seen], owners, len(counts))

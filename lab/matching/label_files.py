@@ -107,7 +107,7 @@ def read_coco(path: Path) -> CocoLabels:
 def read_kitti(path: Path) -> tuple[RealObject, ...]:
     """Read the labels of one image. Raises StorageError with the line that is not KITTI's."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, ValueError) as error:
         raise StorageError(f"{path}: not labels in KITTI's format: {error}") from error
     return tuple(_kitti_object(f"{path}:{number}", line) for number, line in enumerate(lines, 1))
@@ -146,9 +146,9 @@ def read_yolo_classes(path: Path) -> tuple[list[str], bool]:
         StorageError: the file has another layout.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
         if path.suffix not in (".yaml", ".yml"):
-            return text.splitlines(), False
+            return [line.strip() for line in text.rstrip().splitlines()], False
         content = yaml.safe_load(text)
         names = content["names"]
         listed = [names[k] for k in range(len(names))]
@@ -168,7 +168,7 @@ def read_yolo(path: Path, names: Sequence[str], has_keypoints: bool) -> tuple[Re
     """
     objects = []
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, ValueError) as error:
         raise StorageError(f"{path}: not labels in YOLO's format: {error}") from error
     for number, line in enumerate(filter(str.strip, lines), 1):

@@ -103,7 +103,7 @@ def test_meshes_joints_and_groups_are_those_of_mujoco(tmp_path: Path) -> None:
     expected = model.mesh_vert @ data.geom_xmat[1].reshape(3, 3).T + data.geom_xpos[1]
     (shape,) = described.links["base"].visuals
     assert shape.file == "parts/wedge.obj"
-    pose = described.poses_at_zero()["base"] @ shape.T_link_shape
+    pose = described.poses_at_rest()["base"] @ shape.T_link_shape
     corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]) * shape.size
     assert np.sort(pose.apply(corners), axis=0) == pytest.approx(
         np.sort(expected, axis=0), abs=1e-6

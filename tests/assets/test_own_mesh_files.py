@@ -418,3 +418,67 @@ def test_hostile_3mf_is_one_clear_error(tmp_path: Path, model: str, reason: str)
         archive.writestr("3D/3dmodel.model", model)
     with pytest.raises(AssetError, match=reason):
         opened(tmp_path, root).mesh("user/a")
+
+
+ELL = ((1, 1), (1, 3), (0, 3), (0, 0), (3, 0), (3, 1))
+"""Corners of an L of area 5; the fan from the first one covers it, from others it does not."""
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply", "dae", "usda"])
+def test_concave_polygons_have_their_own_area_in_every_format(tmp_path: Path, ending: str) -> None:
+    corners = [*ELL[2:], *ELL[:2]]
+    flat = " ".join(f"{x} {y} 0" for x, y in corners)
+    texts = {
+        "obj": "".join(f"v {x} {y} 0\n" for x, y in corners) + "f 1 2 3 4 5 6\n",
+        "ply": "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n"
+               "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+               "end_header\n" + "".join(f"{x} {y} 0\n" for x, y in corners) + "6 0 1 2 3 4 5\n",
+        "dae": '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+               '<asset><up_axis>Z_UP</up_axis></asset><library_geometries><geometry id="g"><mesh>'
+               f'<source id="p"><float_array id="a" count="18">{flat}</float_array>'
+               '<technique_common><accessor source="#a" count="6" stride="3"><param name="X" '
+               'type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>'
+               '</accessor></technique_common></source><vertices id="v"><input '
+               'semantic="POSITION" source="#p"/></vertices><polylist count="1"><input '
+               'semantic="VERTEX" source="#v" offset="0"/><vcount>6</vcount><p>0 1 2 3 4 5</p>'
+               "</polylist></mesh></geometry></library_geometries></COLLADA>",
+        "usda": '#usda 1.0\n(\nmetersPerUnit = 1\nupAxis = "Z"\n)\ndef Mesh "m" {\n'
+                "int[] faceVertexCounts = [6]\nint[] faceVertexIndices = [0, 1, 2, 3, 4, 5]\n"
+                f"point3f[] points = {[(x, y, 0) for x, y in corners]}\n"
+                'uniform token subdivisionScheme = "none"\n}\n',
+    }  # fmt: skip
+    (tmp_path / f"a.{ending}").write_text(texts[ending])
+    found = read_mesh(Folder(tmp_path), f"a.{ending}").soup.corners
+    crosses = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+    assert 0.5 * np.abs(crosses[:, 2]).sum() == pytest.approx(5.0)
+    assert (crosses[:, 2] > 0.0).all()
+
+
+BOX = [(x, y, z) for x in (0, 1) for y in (0, 2) for z in (0, 5)]
+FACES = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+
+
+def box_obj(scale: float, order: tuple[int, int, int] = (0, 1, 2), shift: float = 0.0) -> str:
+    rows = [[scale * corner[k] + shift for k in order] for corner in BOX]
+    return "".join(f"v {x} {y} {z}\n" for x, y, z in rows) + FACES
+
+
+@pytest.mark.parametrize(("collision", "size"), [
+    (box_obj(1000.0), "1000 x 2000 x 5000 m"),
+    (box_obj(0.001), "0.001 x 0.002 x 0.005 m"),
+    (box_obj(1.0, (2, 1, 0)), "5 x 2 x 1 m"),
+    (box_obj(1.0, shift=20.0), "1 x 2 x 5 m"),
+])  # fmt: skip
+def test_a_collision_mesh_of_another_unit_or_axes_or_place_is_refused(
+    tmp_path: Path, collision: str, size: str
+) -> None:
+    """In millimetres, in kilometres, with X upwards, and 20 m away."""
+    (tmp_path / "a.obj").write_text(box_obj(1.0))
+    (tmp_path / "c.obj").write_text(collision)
+    entry = MeshEntry(file="a.obj", collision="c.obj")
+    fact = rf"c\.obj: it is {size} large or elsewhere than a\.obj, of 1 x 2 x 5 m"
+    with pytest.raises(AssetError, match=fact):
+        import_object(Folder(tmp_path), entry, "user/a")
+    # A simpler part of it is a usual collision mesh.
+    (tmp_path / "c.obj").write_text(box_obj(0.4))
+    assert import_object(Folder(tmp_path), entry, "user/a").collision is not None

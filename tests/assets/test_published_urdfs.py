@@ -172,6 +172,30 @@ def test_limits_that_have_another_effect_than_their_numbers_are_named(
     assert math.isfinite(found.lower) and math.isfinite(found.upper)
 
 
+def test_as_an_object_joints_keep_their_limits_and_follow_those_that_they_mimic(
+    tmp_path: Path,
+) -> None:
+    """A knee of -2.8 to -1.2 rad is at -2.0; fingers that mimic 0 are at their offset of 0.03 m."""
+    parts = [link(name, visual()) for name in ("hip", "shin", "left", "right")]
+    slides = '<limit lower="0" upper="0.05"/>'
+    library = seen(
+        tmp_path, *parts,
+        joint("knee", "hip", "shin", '<limit lower="-2.8" upper="-1.2"/>', "revolute"),
+        joint("a", "hip", "left", slides, "prismatic"),
+        joint("b", "hip", "right", f'{slides}<mimic joint="a" multiplier="-1" offset="0.03"/>',
+              "prismatic"),
+    )  # fmt: skip
+    described = read_description(Folder(tmp_path), "a.urdf")
+    poses = described.poses_at_rest()
+    turn = np.array([[math.cos(-2.0), -math.sin(-2.0)], [math.sin(-2.0), math.cos(-2.0)]])
+    np.testing.assert_allclose(poses["shin"].rotation()[:2, :2], turn, atol=1e-8)
+    assert poses["left"].translation_m == (0.0, 0.0, 0.0)
+    assert poses["right"].translation_m == pytest.approx((0.0, 0.0, 0.03))
+    # Boxes of 0.3 m height, the right one 3 cm higher.
+    low, high = library.bounds_m("user/a")
+    assert high[2] - low[2] == pytest.approx(0.33)
+
+
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 def test_floating_and_planar_joints_stay_at_their_origin(tmp_path: Path, kind: str) -> None:
     """The robot is read; a remark names the joint and its line."""
@@ -180,7 +204,7 @@ def test_floating_and_planar_joints_stay_at_their_origin(tmp_path: Path, kind: s
         joint("j", "a", "b", '<origin xyz="0 0 1"/>', kind),
     )  # fmt: skip
     assert described.joints[0].kind == "fixed"
-    assert described.poses_at_zero()["b"].translation_m == (0.0, 0.0, 1.0)
+    assert described.poses_at_rest()["b"].translation_m == (0.0, 0.0, 1.0)
     assert described.remarks == (f"joint 'j':4:1 is {kind} and stays at its origin",)
 
 

@@ -103,6 +103,16 @@ def test_yolos_rows_with_keypoints_begin_with_the_box(tmp_path: Path) -> None:
     assert picture.objects == (RealObject("cup", (24, 12, 40, 36)),)
 
 
+def test_a_byte_order_mark_and_spaces_are_no_part_of_a_class(tmp_path: Path) -> None:
+    """As editors of Windows write both files of YOLO."""
+    write_picture(tmp_path / "0.png")
+    (tmp_path / "classes.txt").write_bytes("\ufeffcup \r\nplate\r\n\r\n".encode())
+    (tmp_path / "0.txt").write_bytes("\ufeff0 0.5 0.5 0.25 0.5\r\n".encode())
+    real = read_real(tmp_path)
+    assert list(real.category_ids) == ["cup", "plate"]
+    assert [thing.name for thing in real.pictures[0].objects] == ["cup"]
+
+
 CUPS = {"classes.txt": "cup\nplate\n", "a.png": ""}
 
 

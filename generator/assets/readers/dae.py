@@ -18,7 +18,14 @@ import numpy as np
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.readers.mesh_source import WHITE, MeshSource, locate_file, srgb_to_linear
 from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
-from gen_data.core import asset_types, colorimetry, errors, safe_xml, se3
+from gen_data.core import (
+    asset_types,
+    colorimetry,
+    errors,
+    polygon_triangles,
+    safe_xml,
+    se3,
+)
 
 _MAX_ELEMENTS = 1_000_000
 _UP = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}
@@ -137,7 +144,7 @@ def _make_soup(
     soups = []
     for primitive in geometry.primitives:
         # Polygons derive from polylists; other primitives are stray lines.
-        triangles = primitive.triangleset() if isinstance(primitive, Polylist) else primitive
+        triangles = _triangles(primitive) if isinstance(primitive, Polylist) else primitive
         if not isinstance(triangles, TriangleSet) or not len(triangles):
             continue
         slot, node_of = MaterialSlot(), bound.get(triangles.material)
@@ -165,6 +172,20 @@ def _make_soup(
     joined = join_soups(soups)
     one = np.zeros_like(joined.face_groups)
     return [replace(joined, face_groups=one, group_names=soups[0].group_names)]
+
+
+def _triangles(polygons: Any) -> Any:
+    """The set of triangles of polygons of pycollada, whose own is of fans."""
+    from collada.triangleset import TriangleSet
+
+    if not len(polygons.index):
+        return polygons.triangleset()
+    corners = np.asarray(polygons.vertex_index, np.int64)
+    points = _rows(polygons.vertex, corners)
+    sizes = np.asarray(polygons.vcounts, np.int64)
+    triangles, _ = polygon_triangles.split_polygons(sizes, points)
+    indices = np.ascontiguousarray(polygons.index[triangles]).reshape(-1)
+    return TriangleSet(polygons.sources, polygons.material, indices, polygons.xmlnode)
 
 
 def _texture_set(triangles: Any, bound: Any) -> int:

@@ -5,11 +5,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-import numpy as np
-
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.robot_files import resolve_uri
-from gen_data.assets.triangle_soup import Int64, TriangleSoup
+from gen_data.assets.triangle_soup import TriangleSoup
 from gen_data.core import colorimetry, errors, se3
 from gen_data.core.asset_types import Material
 
@@ -42,15 +40,6 @@ def check_face_count(count: int, place: str) -> None:
     """Raise AssetError if a file has more than ``MAX_FACES`` triangles."""
     if count > MAX_FACES:
         raise errors.AssetError(f"{place}: {count} triangles, at most {MAX_FACES}; decimate it")
-
-
-def split_fans(sizes: Int64) -> Int64:
-    """Corner indices [m, 3] of the fan triangles of polygons with the given corner counts."""
-    starts = np.cumsum(sizes) - sizes
-    counts = np.maximum(sizes - 2, 0)
-    first = np.repeat(starts, counts)
-    step = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.stack([first, first + step + 1, first + step + 2], axis=1)
 
 
 def locate_file(folder: Folder, base: str, reference: str, remarks: list[str] | None = None) -> str:

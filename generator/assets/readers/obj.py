@@ -20,7 +20,7 @@ from gen_data.assets.asset_folder import Folder
 from gen_data.assets.readers import mesh_source
 from gen_data.assets.texture_maps import TextureMaps
 from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
-from gen_data.core import asset_types, colorimetry, errors
+from gen_data.core import asset_types, colorimetry, errors, polygon_triangles
 
 
 @dataclass
@@ -43,7 +43,7 @@ class _Statements:
 def read_obj(folder: Folder, relative: str, materials: bool) -> mesh_source.MeshSource:
     """Read an OBJ file with the materials of its MTL files.
 
-    Polygons become triangle fans. Each ``o`` (or, where there is none, each ``g``) is a group.
+    Polygons become triangles. Each ``o`` (or, where there is none, each ``g``) is a group.
     Numbers after the coordinates of a vertex are its sRGB (MeshLab, MeshMixer, ZBrush).
 
     Raises:
@@ -158,17 +158,18 @@ def _build_soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup
         raise ValueError("a face with fewer than three corners")
     if (sizes - 2).sum() > mesh_source.MAX_FACES:
         raise ValueError(f"more than {mesh_source.MAX_FACES} triangles")
-    fans = mesh_source.split_fans(sizes)
-    polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
-    indices = _parse_indices(s.corners)[fans]
+    corners = _parse_indices(s.corners)
     positions, colors = _parse_positions(s.positions)
+    points = _look_up(positions, corners[:, 0], "vertex", required=True)
+    fans, polygon = polygon_triangles.split_polygons(sizes, points)
+    indices = corners[fans]
     texcoords = _parse_table(s.texcoords, 2, "vt")
     normals = _parse_table(s.normals, 3, "vn")
     groups, names = s.polygon_groups, s.group_names
     if max(s.polygon_objects, default=0):
         groups, names = s.polygon_objects, s.object_names
     return TriangleSoup(
-        corners=_look_up(positions, indices[..., 0], "vertex", required=True),
+        corners=points[fans],
         uvs=_look_up(texcoords, indices[..., 1], "vt") if len(texcoords) else None,
         normals=_look_up(normals, indices[..., 2], "vn")
         if len(normals) and (indices[..., 2] > 0).all()

@@ -16,13 +16,13 @@ from gen_data.assets.readers.mesh_source import (
     WHITE,
     MeshSource,
     locate_file,
-    split_fans,
 )
 from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
 from gen_data.config.yaml_scalars import abbreviate
 from gen_data.core.asset_types import Material
 from gen_data.core.colorimetry import srgb_decode
 from gen_data.core.errors import AssetError
+from gen_data.core.polygon_triangles import split_polygons
 
 _MAX_HEADER_BYTES = 65536
 _TYPES = {
@@ -295,16 +295,15 @@ def _build_soup(
         faces, face = (None if strips is None else _split_strips(strips)), {}
     if faces is None:
         return None
-    kept = faces.sizes >= 3
-    fans = split_fans(faces.sizes)
-    polygon = np.repeat(np.arange(len(kept)), np.maximum(faces.sizes - 2, 0))
-    if len(fans) > MAX_FACES:
+    count = int(np.maximum(faces.sizes - 2, 0).sum())
+    if count > MAX_FACES:
         raise ValueError(f"more than {MAX_FACES} triangles")
     index = faces.values.astype(np.int64)
-    if not len(fans):
+    if not count:
         return None
     if index.min() < 0 or index.max() >= len(positions):
         raise ValueError("a face with a vertex index out of range")
+    fans, polygon = split_polygons(faces.sizes, positions[index])
     corner = index[fans]
     uvs = _read_uvs(vertex, face, faces, fans, corner) if images else None
     textured = uvs is not None
