@@ -28,7 +28,7 @@ def main() -> None:
                 for batch in loader:
                     numbers = [int(target["image_id"]) for _, target in batch]
                     boxes = sum(len(target["boxes"]) for _, target in batch)
-                    print(f"{name}, epoch {epoch}: samples {numbers}, {boxes} boxes")
+                    print(f"{name}, epoch {epoch}: images {numbers}, {boxes} boxes")
 
 
 if __name__ == "__main__":

@@ -49,6 +49,7 @@ from gen_data.exporters.sequences import (
     Frame,
     Mount,
     camera_mount,
+    check_one_carrier,
     frame_facts,
     lidar_mount,
     read_sequences,
@@ -262,13 +263,16 @@ def _pose_of(row: Mapping[str, float]) -> SE3:
 def _row(info: DatasetInfo, sample: Sample, lidar: str) -> Row:
     """Line of a sample: mounts of the sensors, lenses, and the ego at the readings."""
     scene = sample.scene
-    ego = lidar_mount(scene, lidar).rig
-    mounts = {lidar: relative_pose(scene, Mount(ego, SE3()), lidar_mount(scene, lidar))}
+    scanner = lidar_mount(scene, lidar)
+    ego, cameras = scanner.rig, sensor_selection.rgb_cameras(info)
+    on_rigs = {lidar: scanner} | {name: camera_mount(scene, name) for name in cameras}
+    check_one_carrier(info, "argoverse2", on_rigs)
+    mounts = {lidar: relative_pose(scene, Mount(ego, SE3()), scanner)}
     lenses = {}
     read = {lidar: sensor_selection.stamp_s(sample, lidar)}
-    for name in sensor_selection.rgb_cameras(info):
+    for name in cameras:
         if name in sample.truth:
-            mounts[name] = relative_pose(scene, Mount(ego, SE3()), camera_mount(scene, name))
+            mounts[name] = relative_pose(scene, Mount(ego, SE3()), on_rigs[name])
             lens = sample.truth[name].camera.intrinsics
             values = (lens.fx_px, lens.fy_px, lens.cx_px - 0.5, lens.cy_px - 0.5, 0.0, 0.0, 0.0,
                       lens.height_px, lens.width_px)  # fmt: skip

@@ -11,7 +11,10 @@
 * **Stuff** is one segment per category and image: scenery that has an instance and no annotation
   (``building``, ``tree``, ``table``, ...), by its category; where images of depth are written, also
   ``road``, ``pavement``, ``grass`` and ``sky`` (see ``background_surfaces``). Categories of stuff
-  that occur in the data set have the ids after the categories of things, in alphabetical order.
+  that occur in the data set are listed, with ids after the categories of things, with gaps: they
+  are numbered among all categories of the program's families, because readers match a training
+  and a test set by id, and the two seldom have the same scenery. Other categories (own assets)
+  come last, in alphabetical order of those that occur.
 * **Void** are pixels of neither: ignored objects, annotated objects below the thresholds, and
   unannotated objects of a category of things (the hood of the ego vehicle): evaluation
   ignores predictions there.
@@ -215,6 +218,10 @@ def _stuff_facts(labels: UInt16, ids: UInt32, names: Sequence[str]) -> list[dict
 
 def _categories(things: Sequence[str], stuff: Sequence[str]) -> list[dict[str, Any]]:
     colors = label_colors.voc_palette()
+    known = _scenery_categories()
+    numbered = [*known, *(name for name in stuff if name not in known)]
+    ids = {name: len(things) + k for k, name in enumerate(numbered, 1)}
+    listed = [*enumerate(things, 1), *sorted((ids[name], name) for name in stuff)]
     return [
         {
             "id": k,
@@ -223,8 +230,17 @@ def _categories(things: Sequence[str], stuff: Sequence[str]) -> list[dict[str, A
             "isthing": int(k <= len(things)),
             "color": colors[1 + (k - 1) % 255].tolist(),
         }
-        for k, name in enumerate([*things, *stuff], 1)
+        for k, name in listed
     ]
+
+
+def _scenery_categories() -> list[str]:
+    """Categories that scenery and ground can have without own assets, sorted."""
+    from gen_data.assets.families import own_families
+    from gen_data.assets.family import Family
+
+    families = (f for f in own_families().values() if isinstance(f, Family))
+    return sorted({family.category for family in families} | set(STUFF_OF_SURFACE.values()))
 
 
 def _image_line(line: str) -> str:

@@ -55,8 +55,10 @@ from gen_data.exporters.sequences import (
     Frame,
     Mount,
     camera_mount,
+    check_one_carrier,
     check_sequence_count,
     frame_facts,
+    lidar_mount,
     matrix_numbers,
     read_sequences,
     relative_pose,
@@ -143,7 +145,8 @@ class KittiRaw(base.ExporterBase):
         """Write points and grey images of each frame, and a line for it.
 
         Raises:
-            ConfigError: see ``check``, or cameras that are not parallel.
+            ConfigError: see ``check``, cameras that are not parallel, or sensors on different
+                carriers.
         """
         self.check(info)
         cameras = self._cameras(info)
@@ -187,6 +190,9 @@ class KittiRaw(base.ExporterBase):
     def _row(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> dict[str, Any]:
         cameras = self._cameras(info)
         lidar = sensor_selection.laser_scanner(info, self.lidar, self.type)
+        mounts = {name: camera_mount(sample.scene, name) for name in cameras.values()}
+        mounts[lidar] = lidar_mount(sample.scene, lidar)
+        check_one_carrier(info, self.type, mounts)
         carrier = camera_mount(sample.scene, cameras["02"]).rig
         unit = navigation_mount(sample.scene, self.oxts, carrier, self.type)
         truly = navigation_mount(sample.scene, self.oxts, carrier, self.type, true=True)

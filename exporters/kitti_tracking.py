@@ -132,6 +132,10 @@ class KittiTracking(base.ExporterBase):
 
     def _row(self, info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         cameras, scene = self._cameras(info), sample.scene
+        mounts = {name: sequences.camera_mount(scene, name) for name in cameras.values()}
+        if lidar := laser_scanner(info, self.lidar, self.type):
+            mounts[lidar] = sequences.lidar_mount(scene, lidar)
+        sequences.check_one_carrier(info, self.type, mounts)
         carrier = sequences.camera_mount(scene, cameras["02"]).rig
         unit = navigation_mount(scene, self.oxts, carrier, self.type)
         truly = navigation_mount(scene, self.oxts, carrier, self.type, true=True)
@@ -140,7 +144,7 @@ class KittiTracking(base.ExporterBase):
         return sequences.frame_facts(info, sample) | {
             "cameras": [number for number, name in cameras.items() if name in sample.truth],
             "oxts": oxts_row(rig_motion(scene, truly), self.origin_deg),
-            "calib": calib_text(scene, cameras, laser_scanner(info, self.lidar, self.type), unit),
+            "calib": calib_text(scene, cameras, lidar, unit),
             "labels": [
                 tracking_label(row, things[instance_id])
                 for row, instance_id in kitti.label_rows(truth, self)

@@ -44,7 +44,9 @@ from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.sequences import (
     Frame,
     camera_mount,
+    check_one_carrier,
     frame_facts,
+    lidar_mount,
     matrix_numbers,
     mounted_pose,
     read_sequences,
@@ -120,7 +122,7 @@ class SemanticKitti(base.ExporterBase):
     lidar: str = ""
     """Sensor of the scans; empty = the first one by name."""
     camera: str = ""
-    """Sensor that becomes camera 0; empty = the first one by name."""
+    """Sensor that becomes camera 0; empty = the first one by name on the scanner's rig."""
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without the sensors, or whose camera is not a pinhole.
@@ -144,9 +146,13 @@ class SemanticKitti(base.ExporterBase):
         sensor_selection.check_pinholes(info, [self.camera or info.cameras[0]], self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write points and labels of each sample, and a line for its scan."""
+        """Write points and labels of each sample, and a line for its scan.
+
+        Raises:
+            ConfigError: see ``check``, or camera and scanner are on different carriers.
+        """
         self.check(info)
-        lidar, camera = self.lidar or info.lidars[0], self.camera or info.cameras[0]
+        lidar = self.lidar or info.lidars[0]
         folder = shard_dir / self.type
         rows = []
         for sample in samples:
@@ -157,6 +163,7 @@ class SemanticKitti(base.ExporterBase):
             turn = velodyne.turn_to_rig(sample.scene, lidar)
             write_bytes(stem.with_suffix(".bin"), velodyne.scan_bytes(points, turn))
             write_bytes(stem.with_suffix(".label"), point_labels(points, sample.scene).tobytes())
+            camera = self._camera(info, sample.scene, lidar)
             eye = camera_mount(sample.scene, camera, true=True)
             row = {
                 "scene": sample.scene_index,
@@ -166,6 +173,16 @@ class SemanticKitti(base.ExporterBase):
             }
             rows.append(frame_facts(info, sample) | row)
         write_frames(folder, rows)
+
+    def _camera(self, info: DatasetInfo, scene: Scene, lidar: str) -> str:
+        """Camera 0. Raises ConfigError if it moves against the scanner, or is not a pinhole."""
+        mounts = {name: camera_mount(scene, name) for name in info.cameras}
+        scanner = lidar_mount(scene, lidar)
+        beside = [name for name in info.cameras if mounts[name].rig == scanner.rig]
+        camera = self.camera or next(iter(beside), info.cameras[0])
+        sensor_selection.check_pinholes(info, [camera], self.type)
+        check_one_carrier(info, self.type, {lidar: scanner, camera: mounts[camera]})
+        return camera
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the scans of each sequence, and the instances in them."""

@@ -204,6 +204,30 @@ def relative_pose(scene: Scene, one: Mount, other: Mount) -> se3.SE3:
     return (mounted_pose(scene, one).inverse() @ mounted_pose(scene, other)).rounded()
 
 
+def check_one_carrier(
+    info: interfaces.DatasetInfo, exporter: str, mounts: Mapping[str, Mount]
+) -> None:
+    """Refuse sensors that move against each other, where a sequence has one calibration.
+
+    Args:
+        info: The data set.
+        exporter: Name in the error text.
+        mounts: Mounts by sensor.
+
+    Raises:
+        ConfigError: the text names two sensors. Cameras without a rig stand still.
+    """
+    (first, mount), *others = mounts.items()
+    for name, other in others:
+        still = mount.rig.startswith("/") and other.rig.startswith("/")
+        if info.steps_per_scene > 1 and other.rig != mount.rig and not still:
+            raise errors.ConfigError(
+                f"exporter '{exporter}': '{first}' and '{name}' are on different carriers, but the "
+                "format has one calibration for a sequence; name sensors of one rig, or list them "
+                "in the exporter's cameras: and sensors:"
+            )
+
+
 def matrix_numbers(matrix: se3.Array) -> str:
     """Format a matrix row by row, with enough digits for rotations."""
     return " ".join(f"{float(value) + 0.0:.12e}" for value in matrix.ravel())

@@ -39,7 +39,7 @@ def detection_target(sample: Sample, camera: str = "") -> tuple[NDArray[np.uint8
     Returns:
         The image, and ``boxes`` float32 [n, 4], ``labels`` int64 [n], ``area`` float32 [n],
         ``iscrowd`` int64 [n]: 1 for objects that a label map ignores, which training leaves out;
-        ``image_id`` int64 [].
+        ``image_id`` int64 []: the image's id in the COCO export, unique among all cameras.
     """
     reading = _camera(sample, camera)
     return _channels_first(reading.rgb), _boxes(sample, reading, _visible(reading))
@@ -189,5 +189,5 @@ def _boxes(sample: Sample, reading: CameraReading, objects: Sequence[ObjectTruth
         "labels": np.array([t.instance.category_id for t in objects], np.int64),
         "area": np.array([t.visible_px for t in objects], np.float32),
         "iscrowd": np.array([t.ignored for t in objects], np.int64),
-        "image_id": np.array(sample.index, np.int64),
+        "image_id": np.array(sample.image_id(reading.name), np.int64),
     }

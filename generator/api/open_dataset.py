@@ -93,7 +93,7 @@ class RecipeSamples(GeneratedSamples):
 
         labels = parse_labels(bytes(files[LABELS_NAME]))
         capture = read_capture(self.info, labels, path, read=read)
-        return LabelledImages(partial(_parse_scene, files), labels, capture)
+        return LabelledImages(partial(_parse_scene, files), labels, capture, self.info.cameras)
 
     def _render(self, index: int) -> Files:
         from gen_data.core.temporary_folders import temporary_folder

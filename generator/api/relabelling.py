@@ -39,6 +39,11 @@ class RelabelledSample:
         return self.record.split
 
     @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of all cameras of the data set."""
+        return self.record.cameras
+
+    @property
     def capture(self) -> Capture:
         """Readings of all sensors."""
         return self.record.capture

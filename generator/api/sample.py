@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gen_data.core import boxes, errors, se3
 from gen_data.core.capture import Capture, Channel, PointCloud, SensorReading
-from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth, image_number
 from gen_data.core.scene import Scene
 
 T = TypeVar("T")
@@ -233,6 +233,11 @@ class SampleRecord(Protocol):
         ...
 
     @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of all cameras of the data set."""
+        ...
+
+    @property
     def scene(self) -> Scene:
         """The world."""
         ...
@@ -307,6 +312,10 @@ class Sample:
         return ByName(
             "camera", {name: CameraReading(readings[name], truth[name]) for name in truth}
         )
+
+    def image_id(self, camera: str) -> int:
+        """Number of a camera's image, from 1, unique in the data set: its id in the COCO export."""
+        return image_number(self.index, self.core.cameras, camera)
 
     @property
     def lidars(self) -> Mapping[str, PointCloud]:

@@ -1,7 +1,7 @@
 """Samples of a data set: readings, their annotations, and the scene they come from."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -557,8 +557,7 @@ class Sample:
 
     def image_id(self, sensor: str) -> int:
         """Number of one image of the sample, from 1, unique in the data set."""
-        names = self.cameras or tuple(sorted(self.truth))
-        return self.index * len(names) + names.index(sensor) + 1
+        return image_number(self.index, self.cameras or tuple(sorted(self.truth)), sensor)
 
     def annotation_id(self, sensor: str, instance_id: int) -> int:
         """Number of one annotation, from 1, unique in the data set.
@@ -567,6 +566,11 @@ class Sample:
         counting, so shards can be written in any order.
         """
         return (self.image_id(sensor) - 1) * ANNOTATION_STRIDE + instance_id
+
+
+def image_number(index: int, cameras: Sequence[str], sensor: str) -> int:
+    """Number of the image of a sample, from 1, among the ``cameras`` of the data set."""
+    return index * len(cameras) + cameras.index(sensor) + 1
 
 
 ANNOTATION_STRIDE = 65_536

@@ -121,7 +121,7 @@ class StoredSamples:
         with self._damage(folder / LABELS_NAME):
             labels = parse_labels(self._line(LABELS_NAME, index))
         capture = read_capture(self.info, labels, folder, has_points=has_points)
-        return LabelledImages(self.kept_scene, labels, capture)
+        return LabelledImages(self.kept_scene, labels, capture, self.info.cameras)
 
     def sample(self, index: int, has_points: bool = True) -> Sample:
         """The whole sample of that number, see ``labelled``, with its scene.
@@ -348,6 +348,7 @@ class LabelledImages:
     read_scene: Callable[[int], KeptScene]
     labels: Labels
     capture: Capture
+    cameras: tuple[str, ...]
 
     @property
     def index(self) -> int:

@@ -95,7 +95,7 @@ def adapt(
     with open_dataset(data) as stored:
         has_map = bool((stored.config.get("labels") or {}).get("map"))
         samples: SampleSequence = stored.relabelled() if has_map else stored
-        truth, sample_of = _read_truth(samples, data, kept.info.cameras)
+        truth, sample_of = _read_truth(samples, data)
         if detector is not None:
             rows = _detect(detector, samples, truth)
         else:
@@ -136,9 +136,7 @@ def _photographs(samples: SampleSequence) -> Iterator[tuple[Sample, str]]:
                 yield sample, name
 
 
-def _read_truth(
-    samples: SampleSequence, data: Path, cameras: Sequence[str]
-) -> tuple[RealSet, dict[int, int]]:
+def _read_truth(samples: SampleSequence, data: Path) -> tuple[RealSet, dict[int, int]]:
     """Objects in all photographs, under the image ids of COCO exports, and samples by these ids."""
     pictures, sample_of = [], {}
     for sample, camera in _photographs(samples):
@@ -149,7 +147,7 @@ def _read_truth(
                 target["boxes"], target["labels"], target["iscrowd"], strict=True
             )
         )
-        image_id = sample.index * len(cameras) + cameras.index(camera) + 1
+        image_id = sample.image_id(camera)
         sample_of[image_id] = sample.index
         pictures.append(RealPicture(image_id, data, (image.shape[2], image.shape[1]), things))
     ids = {name: number for number, name in enumerate(samples.categories, 1)}

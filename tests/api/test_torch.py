@@ -38,13 +38,13 @@ def test_detection_targets_are_those_of_torchvisions_reference_in_a_loader_too(s
     assert target["boxes"].tolist() == [list(map(float, b.xyxy)) for b in camera.boxes2d]
     assert target["labels"].tolist() == [b.category_id for b in camera.boxes2d]
     assert bool((target["boxes"][:, 2:] > target["boxes"][:, :2]).all())
-    assert int(target["image_id"]) == 4
+    assert int(target["image_id"]) == 5
     from torch.utils.data import DataLoader
 
     source = gt.SampleDataset(stored)
     batches = DataLoader(source, 4, shuffle=True, num_workers=1, collate_fn=gt.collate)
     numbers = [int(t["image_id"]) for _, targets in batches for t in targets]
-    assert sorted(numbers) == list(range(10))
+    assert sorted(numbers) == list(range(1, 11))
 
 
 def test_masks_lie_in_their_boxes_and_have_their_areas(stored: Any) -> None:

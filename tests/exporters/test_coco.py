@@ -15,11 +15,14 @@ from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
 from gen_data.annotations.annotate import Thresholds
+from gen_data.api.sample import Sample as SampleView
 from gen_data.core.capture import Channel
 from gen_data.core.scene import Weather
 from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
+from gen_data.targets import detection_target
 from tests.exporters.datasets import street_in
+from tests.exporters.drives import drive_info
 from tests.exporters.label_readers import opened
 
 
@@ -350,3 +353,18 @@ def test_coco_knows_sequences_frames_and_tracks(exported: Any) -> None:
         assert {k: len(ids) for k, ids in by_instance.items()} == {1: 1, 2: 1, 4: 1}
         tracks[split] = set().union(*by_instance.values())
     assert not tracks["train"] & tracks["val"]
+
+
+def test_targets_of_trainers_have_the_image_ids_of_the_file(world: Any, tmp_path: Path) -> None:
+    """Torchvision: unique among all images of the data set, whichever cameras read at a step."""
+    samples = world.drive({"right": 2})
+    folder = world.export(Coco(), drive_info(world), samples, tmp_path)
+    documents = [json.loads(path.read_text()) for path in folder.glob("annotations/*.json")]
+    listed = {(i["sample"], i["sensor"]): i["id"] for d in documents for i in d["images"]}
+    found = {
+        (sample.index, camera): int(detection_target(SampleView(sample), camera)[1]["image_id"])
+        for sample in samples
+        for camera in sample.truth
+    }
+    assert found == listed
+    assert len(set(found.values())) == 12

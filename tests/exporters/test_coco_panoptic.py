@@ -15,13 +15,13 @@ from gen_data.exporters.coco_panoptic import CocoPanoptic
 from tests.exporters.label_readers import segments_of
 
 
-def scenery(world: Any) -> Any:
+def scenery(world: Any, category: str = "tree") -> Any:
     """A tree and a hood, neither annotated, behind and beside an annotated crate."""
     tree = replace(world.instance(5, "crate", 12.0, 1.0, 0.2), annotated=False)
     hood = replace(world.instance(6, "car", 9.0, -3.0, 0.0), annotated=False)
     things = (
         world.instance(1, "crate", 8.0, 1.6, 0.4), world.instance(2, "pedestrian", 9.0, -2.0, 1.0),
-        replace(tree, category="tree", category_id=0), replace(hood, category_id=0),
+        replace(tree, category=category, category_id=0), replace(hood, category_id=0),
     )  # fmt: skip
     return world.sample(7, things, [world.camera()])
 
@@ -93,9 +93,11 @@ def test_it_scores_one_with_scenery_as_stuff_and_unannotated_cars_as_void(datase
     # Names of stuff that occur follow the things; a hood is neither thing nor background.
     truth = read(folder)
     names = {c["id"]: (c["name"], c["isthing"]) for c in truth["categories"]}
-    assert names == {
-        1: ("car", 1), 2: ("crate", 1), 3: ("pedestrian", 1), 4: ("sky", 0), 5: ("tree", 0),
-    }  # fmt: skip
+    assert list(names.values()) == [
+        ("car", 1), ("crate", 1), ("pedestrian", 1), ("sky", 0), ("tree", 0),
+    ]  # fmt: skip
+    assert list(names)[:3] == [1, 2, 3]
+    numbers = {name: number for number, (name, _) in names.items()}
     (annotation,) = (a for a in truth["annotations"] if a["file_name"] == "000000007_color.png")
     shown = [names[s["category_id"]][0] for s in annotation["segments_info"]]
     assert shown == ["crate", "pedestrian", "sky", "tree"]
@@ -104,14 +106,33 @@ def test_it_scores_one_with_scenery_as_stuff_and_unannotated_cars_as_void(datase
         instances = np.asarray(image)
     assert (instances == 6).any()
     assert (ids[instances == 6] == 0).all()
-    (tree,) = (s for s in annotation["segments_info"] if s["category_id"] == 5)
+    (tree,) = (s for s in annotation["segments_info"] if s["category_id"] == numbers["tree"])
     np.testing.assert_array_equal(ids == tree["id"], instances == 5)
     # The level camera has it in its upper half, behind everything.
     truth = read(dataset)
     for annotation in truth["annotations"]:
-        (sky,) = (s for s in annotation["segments_info"] if s["category_id"] == 4)
+        (sky,) = (s for s in annotation["segments_info"] if s["category_id"] == numbers["sky"])
         _, top, _, height = sky["bbox"]
         assert (top, height) == (0, 60)
+
+
+def test_stuff_has_the_same_ids_in_a_training_and_a_test_set_with_other_scenery(
+    world: Any, tmp_path: Path
+) -> None:
+    """Panopticapi and detectron2 match categories by id; own assets take no other's number."""
+    found = []
+    for k, kinds in enumerate((("tree",), ("bench", "tree"), ("my own", "aaa", "bin"))):
+        samples = [replace(scenery(world, kind), index=i) for i, kind in enumerate(kinds)]
+        info = world.info(len(samples), depth_scale_m=1 / 256)
+        folder = world.export(CocoPanoptic(), info, samples, tmp_path / str(k))
+        found.append({c["name"]: c["id"] for c in read(folder)["categories"]})
+        assert len(set(found[k].values())) == len(found[k])
+    first, second, third = found
+    assert first.items() < second.items()
+    assert {n: first[n] for n in ("car", "sky")} == {n: third[n] for n in ("car", "sky")}
+    # In the order of names, then own assets.
+    assert second["bench"] < third["bin"] < second["sky"] < second["tree"] < third["aaa"]
+    assert third["my own"] == third["aaa"] + 1
 
 
 def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:

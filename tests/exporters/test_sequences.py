@@ -2,11 +2,18 @@
 
 import json
 import re
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Camera
+from gen_data.core.se3 import look_at
+from gen_data.exporters.argoverse2 import Argoverse2
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.control_clips import ControlClips
 from gen_data.exporters.kitti import Kitti
@@ -95,3 +102,63 @@ def test_formats_may_lack_readings(exporter: Any, world: Any, slow: Any, tmp_pat
     else:
         assert len(stems(folder / "training/label_2")) == 8
         assert stems(folder / "training/velodyne") == even
+
+
+def with_a_camera_on_a_mast(sample: Sample) -> Sample:
+    """The sample with the right camera 3 m above the start of the drive; it sorts first."""
+
+    def moved(camera: Camera) -> Camera:
+        if camera.name != "right":
+            return camera
+        return replace(camera, name="above", rig="", T_world_camera=MAST)
+
+    def renamed(values: Mapping[str, Any]) -> dict[str, Any]:
+        return {name.replace("right", "above"): value for name, value in values.items()}
+
+    scene = replace(sample.scene, cameras=tuple(map(moved, sample.scene.cameras)))
+    readings = {
+        name: replace(reading, camera=moved(reading.camera), sensor=name)
+        for name, reading in renamed(sample.capture.readings).items()
+    }
+    truth = {n: replace(t, camera=moved(t.camera)) for n, t in renamed(sample.truth).items()}
+    capture = replace(sample.capture, readings=readings)
+    cameras = ("above", "left")
+    return replace(sample, scene=scene, capture=capture, truth=truth, cameras=cameras)
+
+
+MAST = look_at((0.0, 0.0, 3.0), (10.0, 0.0, 1.0))
+OFF_THE_RIG = {
+    "argoverse2": Argoverse2(),
+    "kitti_raw": KittiRaw(image_02="above"),
+    "kitti_tracking": KittiTracking(camera="above"),
+    "semantickitti": SemanticKitti(camera="above"),
+}
+
+
+@pytest.mark.parametrize("name", OFF_THE_RIG)
+def test_a_camera_that_the_scanner_drives_away_from_is_refused(
+    name: str, world: Any, tmp_path: Path
+) -> None:
+    """One calibration cannot hold for all frames: readers would take points to the first one's."""
+    info = world.info(8, ("above", "left"), ("top",), steps_per_scene=4)
+    samples = [with_a_camera_on_a_mast(sample) for sample in world.drive()]
+    with pytest.raises(ConfigError, match=r"different carriers.*one calibration for a sequence"):
+        world.export(OFF_THE_RIG[name], info, samples, tmp_path)
+
+
+def test_the_poses_of_a_drive_are_those_of_a_camera_on_the_scanners_rig(
+    world: Any, tmp_path: Path
+) -> None:
+    """Without a choice, the first camera by name that drives along; the mast's stands still."""
+    info = world.info(8, ("above", "left"), ("top",), steps_per_scene=4)
+    samples = [with_a_camera_on_a_mast(sample) for sample in world.drive()]
+    folders = [
+        world.export(exporter, info, samples, tmp_path / str(k))
+        for k, exporter in enumerate((SemanticKitti(), SemanticKitti(camera="left")))
+    ]
+    for name in ("poses.txt", "calib.txt"):
+        chosen, named = ((f / "sequences/00" / name).read_text() for f in folders)
+        assert chosen == named
+    lines = (folders[0] / "sequences/00/poses.txt").read_text().splitlines()
+    ways_m = [float(line.split()[11]) for line in lines]
+    assert ways_m == pytest.approx([0.0, 1.0, 2.0, 3.0], abs=0.01)
