@@ -82,7 +82,7 @@ class Sight:
         points_m: Points on first surfaces, in the world, [h, w, 3]; the eye where nothing is met.
         away_m: Their distance over the ground [h, w].
         unlabelled: Whether a first surface is of no instance [h, w].
-        steady: Whether four rays 0.02 px beside the centre meet the same body [h, w].
+        steady: Whether four rays 0.02 px off the centre meet the same body [h, w].
         eye_m: Place of the camera.
     """
 
@@ -105,10 +105,10 @@ class Sight:
         paved = [_paved_faces(body, assets) for body in bodies]
         own = np.array([body.instance_id for body in bodies])
         self.unlabelled = self.met & (own[hits.mesh] == 0)
-        beside = rays / rays[..., 2:]
+        level = rays / rays[..., 2:]
         px = 0.02 / camera.intrinsics.fx_px
         moved = [
-            self._caster.cast((0.0, 0.0, 0.0), beside + np.array((x, y, 0.0))).mesh
+            self._caster.cast((0.0, 0.0, 0.0), level + np.array((x, y, 0.0))).mesh
             for x, y in ((px, px), (px, -px), (-px, px), (-px, -px))
         ]
         self.steady = np.all([mesh == hits.mesh for mesh in moved], axis=0)

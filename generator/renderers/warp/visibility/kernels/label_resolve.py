@@ -93,9 +93,9 @@ def across_ray(p: wp.vec3, way: wp.vec3):
 
 @wp.func
 def weight_beside(world: records.World, hit: wp.vec2i, d: wp.vec3):
-    """Barycentric weights (u, v) of the point on a face nearest to a camera-frame ray beside it.
+    """Barycentric weights (u, v) of the point on a face nearest to a camera-frame ray next to it.
 
-    Weights clamped one by one would be those of a far corner where the ray misses a sliver.
+    Weights clamped one by one would give a far corner where the ray misses a sliver.
     """
     b = hit[0]
     g = world.bodies[b].geometry
