@@ -11,10 +11,10 @@
 * **Stuff** is one segment per category and image: scenery that has an instance and no annotation
   (``building``, ``tree``, ``table``, ...), by its category; where images of depth are written, also
   ``road``, ``pavement``, ``grass`` and ``sky`` (see ``background_surfaces``). Categories of stuff
-  that occur in the data set are listed, with ids after the categories of things, with gaps: they
+  that occur in the data set are listed, with ids after the other categories, with gaps: they
   are numbered among all categories of the program's families, because readers match a training
   and a test set by id, and the two seldom have the same scenery. Other categories (own assets)
-  come last, in alphabetical order of those that occur.
+  come last, in alphabetical order, if they occur.
 * **Void** are pixels of neither: ignored objects, annotated objects below the thresholds, and
   unannotated objects of a category of things (the hood of the ego vehicle): evaluation
   ignores predictions there.

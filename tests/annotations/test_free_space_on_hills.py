@@ -74,11 +74,11 @@ CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE})
 
 
 class Sight:
-    """What rays of Embree through the pixels of a sample's camera meet.
+    """First surfaces on rays of Embree through the pixels of a sample's camera meet.
 
     Attributes:
-        scene: Of the sample.
-        met: Whether a ray meets anything, [h, w].
+        scene: Scene of the sample.
+        met: Whether a ray meets a surface, [h, w].
         points_m: Points on first surfaces, in the world, [h, w, 3]; the eye where nothing is met.
         away_m: Their distance over the ground [h, w].
         unlabelled: Whether a first surface is of no instance [h, w].
