@@ -118,7 +118,7 @@ class RobotDescription:
     def poses_at_rest(self) -> dict[str, SE3]:
         """``T_root_link`` of every link, as a rigid object.
 
-        Joints are at 0, or in the middle of limits that exclude 0; mimic joints follow their leaders.
+        Joints are at 0, or in the middle of limits that exclude 0; mimic joints follow others.
         """
         free = {j.name: rest_position(j) for j in self.joints if j.movable and not j.mimic}
         movable = [joint.name for joint in self.joints if joint.movable]
