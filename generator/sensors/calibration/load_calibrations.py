@@ -77,11 +77,19 @@ def _load_mounting(sensor: Node, mounting: Node, field: str) -> dict[str, Node]:
     asked = _validated(mounting, Mounting, f"{field}.mounting")
     file = mounting.entries["file"]
     calibration = _read(file, f"{field}.mounting.file", rectified=asked.rectified)
-    optical = None if asked.axes is None else asked.axes == "optical"
     try:
-        pose = calibration.mount(asked.frame, asked.relative_to, optical=optical)
+        frame, base = calibration.ends(asked.frame, asked.relative_to)
+        pose = calibration.mount(frame, base, axes=asked.axes, relative_axes=asked.relative_axes)
     except ValueError as error:
         refuse(mounting.position, f"{field}.mounting", str(error))
+    rig = sensor.get("rig")
+    is_unstated = asked.relative_axes is None and not calibration.frames[base].optical
+    if rig is not None and rig.text.endswith("_wrist") and is_unstated:
+        fact = (
+            f"the rig '{rig.text}' has X out of the hand; state the axes of '{base}': "
+            "relative_axes: hand (Z out of it, as of the link of a gripper) or body"
+        )
+        refuse(mounting.position, f"{field}.mounting.relative_axes", fact)
     return {
         name: _node(file.position, value)
         for name, value in place_of(pose, _UNITS[asked.unit]).items()
