@@ -284,6 +284,19 @@ def test_numbers_that_no_lens_here_has_are_refused(tmp_path: Path, content: str,
     assert fact in told(tmp_path, LENS, content=content)
 
 
+@pytest.mark.parametrize(("size", "fact"), [
+    ("", "lens.file: camera.yaml does not state the size of its images; give size_px"),
+    ("size_px: [320, 240], ", "the principal point (318.7, 259.3) of camera.yaml is far from the "
+     "middle of 320 x 240 pixels; expected size_px of the calibrated images"),
+])  # fmt: skip
+def test_images_of_unknown_size_are_refused(tmp_path: Path, size: str, fact: str) -> None:
+    """Files of nuScenes and KITTI, and many of OpenCV, do not state it."""
+    content = "K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\n"
+    assert fact in told(tmp_path, size + LENS, content=content)
+    found = sensor(tmp_path, "size_px: [640, 512], " + LENS, content=content)
+    assert_projects(found.nominal_intrinsics(), project_cv(np.zeros(5)))
+
+
 def test_a_height_before_the_width_is_pointed_out(tmp_path: Path) -> None:
     content = "image_size: [512, 640]\nK: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\n"
     with pytest.warns(ConfigWarning, match=r"\(318\.7, 259\.3\) is far from the middle of 512 x"):

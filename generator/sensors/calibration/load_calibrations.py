@@ -61,6 +61,7 @@ def _load_lens(sensor: Node, lens: Node, field: str) -> dict[str, Node]:
     except ValueError as error:
         refuse((lens.get("camera") or file).position, f"{field}.lens.camera", str(error))
     _warn_of_swapped_size(camera, file.text)
+    _check_known_size(sensor, camera, f"{field}.lens.file", file)
     place = camera.position
     found = {
         "lens": _node(place, _lens_entries(camera)),
@@ -115,6 +116,37 @@ def _read(file: Node, field: str, *, fisheye: bool = False, rectified: bool = Fa
         message = f"{path}: {calibration.kind}; not used: {listed}"
         warnings.warn(message, errors.ConfigWarning, stacklevel=2)
     return calibration
+
+
+def _check_known_size(sensor: Node, camera: CalibratedCamera, field: str, file: Node) -> None:
+    """Refuse a calibration of images of unknown size, or whose middle is not in the sensor's.
+
+    Raises:
+        ConfigError: the size is unknown, or does not fit the principal point.
+    """
+    size = sensor.get("size_px")
+    if camera.size_px is not None:
+        return
+    if size is None:
+        fact = f"{file.text} does not state the size of its images; give size_px, its width first"
+        refuse(file.position, field, fact)
+    sides = [one.content for one in size.items]
+    whole = [side for side in sides if isinstance(side, int) and side > 0]
+    if len(whole) != 2 or len(sides) != 2:
+        return
+    width, height = whole
+    cx, cy = camera.center_px
+    if max(abs(cx / width - 0.5), abs(cy / height - 0.5)) > _OFF_CENTER:
+        fact = (
+            f"the principal point ({cx:g}, {cy:g}) of {file.text} is far from the middle of "
+            f"{width} x {height} pixels; expected size_px of the calibrated images, which the "
+            "file does not state"
+        )
+        refuse(size.position, field, fact)
+
+
+_OFF_CENTER = 0.3
+"""Largest distance of a principal point from the middle, as a share of a side."""
 
 
 def _warn_of_swapped_size(camera: CalibratedCamera, file: str) -> None:
