@@ -482,6 +482,12 @@ def test_a_pair_of_opencv_is_placed_by_r_and_t(tmp_path: Path) -> None:
     T_2_1[:3, :3], T_2_1[:3, 3] = R, T[:, 0] / 1000
     np.testing.assert_allclose(rig_pose(found), OPTICAL @ np.linalg.inv(T_2_1), atol=1e-6)
 
+    # OpenCV's sample writes a file of extrinsics, and one of intrinsics.
+    alone = cv_text(".yml", tmp_path, {"R": R, "T": T})
+    same = mounted(tmp_path, "frame: '2', unit: mm", "extrinsics.yml", alone)
+    np.testing.assert_allclose(rig_pose(same), rig_pose(found), atol=1e-12)
+    assert "has several cameras, or none" in told(tmp_path, LENS, "extrinsics.yml", content=alone)
+
 
 TF = """\
 transforms:
