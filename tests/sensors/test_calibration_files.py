@@ -155,10 +155,10 @@ def test_a_principal_point_is_shifted_scaled_and_cropped(
 
 
 @pytest.mark.parametrize(("text", "fact"), [
-    ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 1, cy_px: 1}",
+    ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 320, cy_px: 240}",
      "intrinsics: excludes hfov_deg"),
     ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1}", "missing key 'cy_px'"),
-    ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 1, cy_px: 1}", "0 is not"),
+    ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 320, cy_px: 240}", "0 is not"),
     ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1, cy_px: 1, size_px: [640, 400]}",
      "is taller than the calibrated 640 x 400"),
     ("hfov_deg: 60, lens: {model: calibrated, camera: euroc_cam0}", "leave out hfov_deg"),
@@ -286,8 +286,8 @@ def test_numbers_that_no_lens_here_has_are_refused(tmp_path: Path, content: str,
 
 @pytest.mark.parametrize(("size", "fact"), [
     ("", "lens.file: camera.yaml does not state the size of its images; give size_px"),
-    ("size_px: [320, 240], ", "the principal point (318.7, 259.3) of camera.yaml is far from the "
-     "middle of 320 x 240 pixels; expected size_px of the calibrated images"),
+    ("size_px: [320, 240], ", "the principal point (318.7, 259.3) is far from the middle of 320 x "
+     "240 pixels; expected size_px of the calibrated images, which camera.yaml does not state"),
 ])  # fmt: skip
 def test_images_of_unknown_size_are_refused(tmp_path: Path, size: str, fact: str) -> None:
     """Files of nuScenes and KITTI, and many of OpenCV, do not state it."""
@@ -295,6 +295,19 @@ def test_images_of_unknown_size_are_refused(tmp_path: Path, size: str, fact: str
     assert fact in told(tmp_path, size + LENS, content=content)
     found = sensor(tmp_path, "size_px: [640, 512], " + LENS, content=content)
     assert_projects(found.nominal_intrinsics(), project_cv(np.zeros(5)))
+
+
+@pytest.mark.parametrize("size", ["", "size_px: [640, 480], "])
+def test_numbers_of_larger_images_than_the_cameras_are_pointed_out(
+    tmp_path: Path, size: str
+) -> None:
+    """A camera without a size has 640 x 480 pixels; with that of the calibration all is well."""
+    numbers = "intrinsics: {fx_px: 1400, fy_px: 1400, cx_px: 960, cy_px: 540%s}"
+    fact = r"mine\.yaml:3:.*sensors\[0\]\.intrinsics: the principal point \(960, 540\) is far from"
+    with pytest.warns(ConfigWarning, match=fact):
+        sensor(tmp_path, size + numbers % "")
+    sensor(tmp_path, size + numbers % ", size_px: [1920, 1440]")
+    sensor(tmp_path, "size_px: [1920, 1080], " + numbers % "")
 
 
 def test_a_height_before_the_width_is_pointed_out(tmp_path: Path) -> None:
