@@ -1,19 +1,16 @@
 """Robot arms."""
 
-import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from gen_data.core import asset_types, interfaces, kinematics, se3
+from gen_data.core import asset_types, interfaces, kinematics, scene_time, se3
 from gen_data.core.scene import Articulation, Instance, Rig, Scene
 from gen_data.scene_templates.element import PlacedElement, find_surfaces, next_instance_id
 
 CATEGORY = "robot_arm"
-R_GRASP_RIG = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
-"""Rotation between frames: a rig's X axis is a grasp frame's Z axis; they share the Y axis."""
 
 
 class Robot(PlacedElement):
@@ -104,5 +101,5 @@ def make_wrist_rig(name: str, arm: str, robot: asset_types.RobotModel) -> Rig:
     carrier = hand if hand in visible else visible[-1]
     poses = kinematics.link_poses(robot, se3.SE3(), robot.home)
     T_carrier_hand = poses[carrier].inverse() @ poses[hand]
-    T_hand_rig = se3.SE3((0.0, 0.0, 0.0), turn) @ se3.SE3((0.0, 0.0, 0.0), R_GRASP_RIG)
+    T_hand_rig = se3.SE3((0.0, 0.0, 0.0), turn) @ scene_time.HAND_RIG_AXES
     return Rig(name, f"{arm}/{carrier}", (T_carrier_hand @ T_hand_rig).rounded())

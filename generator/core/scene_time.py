@@ -1,5 +1,6 @@
 """Scenes at other instants."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -19,6 +20,8 @@ from gen_data.core.se3 import SE3, Vec3, rotate_by_quaternion
 
 RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
 """``T_camera_rig``: X forward, Y left, Z up in the camera's X right, Y down, Z forward."""
+HAND_RIG_AXES = SE3((0.0, 0.0, 0.0), (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0))
+"""``T_hand_rig``: X of the rig on a hand is the hand's Z, out of it; they share the Y axis."""
 
 _DRIVEN = frozenset({"driving", "bicycle"})
 _SITTING = "sitting"

@@ -38,6 +38,9 @@ class Mounting(Strict):
         axes: Axes of ``frame``: optical, X right, Y down, Z forward; or body, X forward, Y left, Z
             up.
             null = as the format has them; by the frame's name for ROS (REP 103).
+        relative_axes: The same of ``relative_to``; or hand, Z out of the hand and Y along which its
+            fingers open, as of the link of a gripper and a tool's frame (tool0). A rig on a wrist
+            needs it.
         rectified: Whether to take the place of the rectified camera, from its projection matrix.
         unit: Unit of lengths in the file.
     """
@@ -46,6 +49,7 @@ class Mounting(Strict):
     frame: str = ""
     relative_to: str = ""
     axes: Literal["optical", "body"] | None = None
+    relative_axes: Literal["optical", "body", "hand"] | None = None
     rectified: bool = False
     unit: Literal["m", "cm", "mm"] = "m"
 

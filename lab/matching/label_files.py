@@ -93,7 +93,7 @@ def read_coco(path: Path) -> CocoLabels:
         images = tuple(
             CocoImage(
                 row["id"],
-                str(row.get("file_name", "")),
+                _posix(row.get("file_name", "")),
                 (int(row.get("width", 0)), int(row.get("height", 0))),
                 tuple(objects[row["id"]]),
             )
@@ -102,6 +102,11 @@ def read_coco(path: Path) -> CocoLabels:
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise StorageError(f"{path}: not annotations in COCO's format: {error!r}") from error
     return CocoLabels(images, {name: number for number, name in names.items()}, empty)
+
+
+def _posix(name: object) -> str:
+    """A path as tools on Windows write it, too."""
+    return str(name).replace("\\", "/")
 
 
 def read_kitti(path: Path) -> tuple[RealObject, ...]:
@@ -202,7 +207,7 @@ def read_voc(path: Path) -> tuple[str, tuple[int, int], tuple[RealObject, ...]]:
         objects = tuple(_voc_object(item) for item in root.iter("object"))
     except (OSError, ValueError, ElementTree.ParseError) as error:
         raise StorageError(f"{path}: not annotations in VOC's format: {error}") from error
-    return root.findtext("filename") or "", (size[0], size[1]), objects
+    return _posix(root.findtext("filename") or ""), (size[0], size[1]), objects
 
 
 def _voc_object(item: ElementTree.Element) -> RealObject:

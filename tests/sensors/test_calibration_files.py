@@ -15,10 +15,13 @@ import numpy as np
 import pytest
 
 from gen_data.assemble.config import load_config
+from gen_data.assets.library import open_library
 from gen_data.core.errors import ConfigError, ConfigWarning
 from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.kinematics import link_poses
 from gen_data.core.se3 import SE3, Array
 from gen_data.core.serialization import canonical_json
+from gen_data.scene_templates.robot import make_wrist_rig
 
 K = np.array([[812.4, 0.0, 318.7], [0.0, 811.9, 259.3], [0.0, 0.0, 1.0]])
 D5 = np.array([-0.21, 0.09, 0.0007, -0.0004, -0.012])
@@ -152,10 +155,10 @@ def test_a_principal_point_is_shifted_scaled_and_cropped(
 
 
 @pytest.mark.parametrize(("text", "fact"), [
-    ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 1, cy_px: 1}",
+    ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 320, cy_px: 240}",
      "intrinsics: excludes hfov_deg"),
     ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1}", "missing key 'cy_px'"),
-    ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 1, cy_px: 1}", "0 is not"),
+    ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 320, cy_px: 240}", "0 is not"),
     ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1, cy_px: 1, size_px: [640, 400]}",
      "is taller than the calibrated 640 x 400"),
     ("hfov_deg: 60, lens: {model: calibrated, camera: euroc_cam0}", "leave out hfov_deg"),
@@ -279,6 +282,32 @@ def test_a_message_of_ros_with_an_empty_region_and_no_binning_is_of_all_pixels(
 ])  # fmt: skip
 def test_numbers_that_no_lens_here_has_are_refused(tmp_path: Path, content: str, fact: str) -> None:
     assert fact in told(tmp_path, LENS, content=content)
+
+
+@pytest.mark.parametrize(("size", "fact"), [
+    ("", "lens.file: camera.yaml does not state the size of its images; give size_px"),
+    ("size_px: [320, 240], ", "the principal point (318.7, 259.3) is far from the middle of 320 x "
+     "240 pixels; expected size_px of the calibrated images, which camera.yaml does not state"),
+])  # fmt: skip
+def test_images_of_unknown_size_are_refused(tmp_path: Path, size: str, fact: str) -> None:
+    """Files of nuScenes and KITTI, and many of OpenCV, do not state it."""
+    content = "K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\n"
+    assert fact in told(tmp_path, size + LENS, content=content)
+    found = sensor(tmp_path, "size_px: [640, 512], " + LENS, content=content)
+    assert_projects(found.nominal_intrinsics(), project_cv(np.zeros(5)))
+
+
+@pytest.mark.parametrize("size", ["", "size_px: [640, 480], "])
+def test_numbers_of_larger_images_than_the_cameras_are_pointed_out(
+    tmp_path: Path, size: str
+) -> None:
+    """A camera without a size has 640 x 480 pixels; with that of the calibration all is well."""
+    numbers = "intrinsics: {fx_px: 1400, fy_px: 1400, cx_px: 960, cy_px: 540%s}"
+    fact = r"mine\.yaml:3:.*sensors\[0\]\.intrinsics: the principal point \(960, 540\) is far from"
+    with pytest.warns(ConfigWarning, match=fact):
+        sensor(tmp_path, size + numbers % "")
+    sensor(tmp_path, size + numbers % ", size_px: [1920, 1440]")
+    sensor(tmp_path, "size_px: [1920, 1080], " + numbers % "")
 
 
 def test_a_height_before_the_width_is_pointed_out(tmp_path: Path) -> None:
@@ -466,6 +495,12 @@ def test_a_pair_of_opencv_is_placed_by_r_and_t(tmp_path: Path) -> None:
     T_2_1[:3, :3], T_2_1[:3, 3] = R, T[:, 0] / 1000
     np.testing.assert_allclose(rig_pose(found), OPTICAL @ np.linalg.inv(T_2_1), atol=1e-6)
 
+    # OpenCV's sample writes a file of extrinsics, and one of intrinsics.
+    alone = cv_text(".yml", tmp_path, {"R": R, "T": T})
+    same = mounted(tmp_path, "frame: '2', unit: mm", "extrinsics.yml", alone)
+    np.testing.assert_allclose(rig_pose(same), rig_pose(found), atol=1e-12)
+    assert "has several cameras, or none" in told(tmp_path, LENS, "extrinsics.yml", content=alone)
+
 
 TF = """\
 transforms:
@@ -614,6 +649,62 @@ def test_rectified_cameras_and_the_scanner_of_kittis_raw_data_are_placed_in_one_
         expected[:, :2] / expected[:, 2:] + 0.5,
         atol=0.01,
     )
+
+
+HAND = """\
+<robot name="r">
+<link name="base"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
+<link name="flange"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
+<link name="hand"><visual><geometry><box size="0.1 0.2 0.1"/></geometry></visual></link>
+<link name="eye_link"/><link name="eye_optical_frame"/>
+<joint name="a" type="revolute"><parent link="base"/><child link="flange"/><axis xyz="0 0 1"/>
+<origin xyz="0.1 0.2 0.5" rpy="0.3 0.2 0.1"/><limit lower="-1" upper="1"/></joint>
+<joint name="b" type="fixed"><parent link="flange"/><child link="hand"/>
+<origin xyz="0 0 0.1" rpy="0 0 0.785"/></joint>
+<joint name="c" type="fixed"><parent link="hand"/><child link="eye_link"/>
+<origin xyz="0.07 0.02 0.03" rpy="0.1 -1.4 0.2"/></joint>
+<joint name="d" type="fixed"><parent link="eye_link"/><child link="eye_optical_frame"/>
+<origin xyz="0 0.015 0" rpy="-1.57079632679 0 -1.57079632679"/></joint></robot>
+"""
+
+
+def rpy_matrix(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
+    """Of an origin of URDF: ``Rz(yaw) Ry(pitch) Rx(roll)``."""
+    turns = [cv2.Rodrigues(a * np.eye(3)[k])[0] for k, a in enumerate(rpy)]
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turns[2] @ turns[1] @ turns[0], xyz
+    return matrix
+
+
+def test_a_camera_on_a_hand_is_where_the_links_of_its_robot_have_it(tmp_path: Path) -> None:
+    """The rig on a wrist has X out of the hand, the link Z: the camera is where the URDF says."""
+    (tmp_path / "assets.yaml").write_text(
+        "robots: [{id: arm, file: arm.urdf, gripper: {link: hand, finger_joints: [], "
+        "grasp_offset_m: 0.1, stroke_m: 0.08}}]\n"
+    )
+    (tmp_path / "arm.urdf").write_text(HAND)
+    robot = open_library([tmp_path], tmp_path / "cache", tmp_path).robot("user/arm")
+    rig = make_wrist_rig("arm_wrist", "arm", robot)
+    text = "rig: arm_wrist, mounting: {file: FILE, frame: eye_optical_frame, relative_to: hand, %s}"
+    with pytest.warns(ConfigWarning, match="joint a"):
+        found = sensor(tmp_path, text % "relative_axes: hand", "arm.urdf")
+
+    angle = 0.7
+    carrier = link_poses(robot, SE3(), (angle,))[rig.body.partition("/")[2]]
+    axes = SE3((0.0, 0.0, 0.0), (0.5, -0.5, 0.5, -0.5))
+    eye = carrier @ rig.T_body_rig @ found.T_rig_sensor @ axes
+    chain = [
+        rpy_matrix((0.1, 0.2, 0.5), (0.3, 0.2, 0.1)),
+        rpy_matrix((0, 0, 0), (0, 0, angle)),
+        rpy_matrix((0, 0, 0.1), (0, 0, 0.785)),
+        rpy_matrix((0.07, 0.02, 0.03), (0.1, -1.4, 0.2)),
+        rpy_matrix((0, 0.015, 0), (-math.pi / 2, 0, -math.pi / 2)),
+    ]
+    np.testing.assert_allclose(eye.matrix(), np.linalg.multi_dot(chain), atol=1e-6)
+
+    with pytest.warns(ConfigWarning, match="joint a"):
+        message = told(tmp_path, text.replace(", %s", ""), "arm.urdf")
+    assert "mounting.relative_axes: the rig 'arm_wrist' has X out of the hand; state" in message
 
 
 @pytest.mark.parametrize(("text", "name", "content", "fact"), [

@@ -1,5 +1,6 @@
 """Folders of users are read as they are, and what cannot be used is counted."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,25 @@ def test_a_byte_order_mark_and_spaces_are_no_part_of_a_class(tmp_path: Path) -> 
     real = read_real(tmp_path)
     assert list(real.category_ids) == ["cup", "plate"]
     assert [thing.name for thing in real.pictures[0].objects] == ["cup"]
+
+
+def test_paths_of_windows_name_the_same_images(tmp_path: Path) -> None:
+    """Files of COCO and VOC with backslashes, from annotation tools."""
+    write_picture(tmp_path / "images/0.png")
+    box = {"id": 1, "image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4]}
+    content = {"images": [{"id": 1, "file_name": "images\\0.png"}], "annotations": [box],
+               "categories": [{"id": 1, "name": "cup"}]}  # fmt: skip
+    (tmp_path / "labels.json").write_text(json.dumps(content))
+    (picture,) = read_real(tmp_path).pictures
+    assert picture.path == tmp_path / "images/0.png"
+    (tmp_path / "labels.json").unlink()
+    (tmp_path / "a.xml").write_text(
+        "<annotation><filename>C:\\data\\0.png</filename><object><name>cup</name><bndbox>"
+        "<xmin>2</xmin><ymin>3</ymin><xmax>4</xmax><ymax>6</ymax></bndbox></object></annotation>"
+    )
+    (tmp_path / "images/0.png").rename(tmp_path / "0.png")
+    (picture,) = read_real(tmp_path).pictures
+    assert picture.objects == (RealObject("cup", (1, 2, 4, 6)),)
 
 
 CUPS = {"classes.txt": "cup\nplate\n", "a.png": ""}

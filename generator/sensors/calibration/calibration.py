@@ -14,6 +14,14 @@ ROTATION_ERROR_MAX = 1e-2
 """Largest entry of ``R R^T - 1`` of matrices that were printed with few digits."""
 
 
+AXES: Mapping[str, se3.SE3] = {
+    "body": se3.SE3(),
+    "optical": scene_time.RIG_AXES,
+    "hand": scene_time.HAND_RIG_AXES,
+}
+"""``T_frame_rig`` of frames by their axes: a rig's are X forward, Y left, Z up."""
+
+
 @dataclass(frozen=True, slots=True)
 class CalibratedCamera:
     """Intrinsics of one camera as its file has them.
@@ -79,30 +87,45 @@ class Calibration:
             return next(iter(self.cameras.values()))
         return self.cameras[self._known(name, list(self.cameras), "camera")]
 
-    def mount(self, frame: str, relative_to: str = "", *, optical: bool | None = None) -> se3.SE3:
+    def mount(
+        self, frame: str, relative_to: str = "", *, axes: str | None = None,
+        relative_axes: str | None = None,
+    ) -> se3.SE3:  # fmt: skip
         """``T_rig_sensor`` of a frame, both X forward, Y left, Z up.
 
         Args:
             frame: Its name; empty = the only one that is not a root.
             relative_to: Name of the frame of the rig; empty = the root above ``frame``.
-            optical: Axes of ``frame``; None = as the format has them.
+            axes: Axes of ``frame``, a key of ``AXES``; None = as the format has them.
+            relative_axes: Axes of the frame of the rig, alike.
 
         Raises:
             ValueError: a name is unknown, or no chain of poses connects them.
+        """
+        frame, base = self.ends(frame, relative_to)
+        root, T_root_frame = self._from_root(frame)
+        base_root, T_root_base = self._from_root(base)
+        if root != base_root:
+            raise ValueError(f"{self.file} does not connect the frames '{base}' and '{frame}'")
+        T_base_rig, T_frame_sensor = (
+            AXES[stated or ("optical" if self.frames[name].optical else "body")]
+            for name, stated in ((base, relative_axes), (frame, axes))
+        )
+        T_base_frame = T_root_base.inverse() @ T_root_frame
+        return T_base_rig.inverse() @ T_base_frame @ T_frame_sensor
+
+    def ends(self, frame: str, relative_to: str = "") -> tuple[str, str]:
+        """Full names of the frames of a sensor and of its rig; see ``mount``.
+
+        Raises:
+            ValueError: a name is unknown.
         """
         inner = [name for name, one in self.frames.items() if one.parent]
         if not frame and len(inner) == 1:
             frame = inner[0]
         frame = self._known(frame, list(self.frames), "frame")
-        root, T_root_frame = self._from_root(frame)
-        base = self._known(relative_to or root, list(self.frames), "frame")
-        base_root, T_root_base = self._from_root(base)
-        if root != base_root:
-            raise ValueError(f"{self.file} does not connect the frames '{base}' and '{frame}'")
-        is_optical = self.frames[frame].optical if optical is None else optical
-        T_base_frame = T_root_base.inverse() @ T_root_frame
-        before = scene_time.RIG_AXES.inverse() if self.frames[base].optical else se3.SE3()
-        return before @ T_base_frame @ (scene_time.RIG_AXES if is_optical else se3.SE3())
+        root, _ = self._from_root(frame)
+        return frame, self._known(relative_to or root, list(self.frames), "frame")
 
     def _from_root(self, name: str) -> tuple[str, se3.SE3]:
         """The root above a frame, and ``T_root_frame``."""

@@ -128,7 +128,10 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
             cameras[number or single] = _read_out(camera, entries)
             frames |= {} if frame is None else {"rectified": Frame(optical=True)}
             frames |= {} if frame is None else {number or single: frame}
-    if not cameras:
+    if not cameras and not rectified:
+        # OpenCV's sample stereo_calib writes R and T to a file of their own.
+        frames = _pair_frames(entries)
+    if not cameras and not frames:
         known = "projection matrix such as P" if rectified else "camera matrix such as K"
         fail(root, "", f"no camera found; expected a {known}, {_MATRICES[0]} or M1")
     if "2" in cameras and not rectified:

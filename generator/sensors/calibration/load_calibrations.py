@@ -17,6 +17,7 @@ from gen_data.core.lens import COEFFICIENTS
 from gen_data.sensors.calibration.calibration import CalibratedCamera, Calibration
 from gen_data.sensors.calibration.read_calibration import read_calibration
 from gen_data.sensors.camera.lens_models import CalibratedLens
+from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.mounting import Mounting
 
 M = TypeVar("M", bound=base_model.Strict)
@@ -38,6 +39,7 @@ def load_calibrations(sensor: Node, field: str) -> Node:
     """
     if not isinstance(sensor.content, Mapping):
         return sensor
+    _warn_of_unfit_numbers(sensor, field)
     content = dict(sensor.content)
     lens, mounting = content.get("lens"), content.get("mounting")
     if lens is not None and lens.get("file") is not None:
@@ -61,6 +63,7 @@ def _load_lens(sensor: Node, lens: Node, field: str) -> dict[str, Node]:
     except ValueError as error:
         refuse((lens.get("camera") or file).position, f"{field}.lens.camera", str(error))
     _warn_of_swapped_size(camera, file.text)
+    _check_known_size(sensor, camera, f"{field}.lens.file", file)
     place = camera.position
     found = {
         "lens": _node(place, _lens_entries(camera)),
@@ -77,11 +80,19 @@ def _load_mounting(sensor: Node, mounting: Node, field: str) -> dict[str, Node]:
     asked = _validated(mounting, Mounting, f"{field}.mounting")
     file = mounting.entries["file"]
     calibration = _read(file, f"{field}.mounting.file", rectified=asked.rectified)
-    optical = None if asked.axes is None else asked.axes == "optical"
     try:
-        pose = calibration.mount(asked.frame, asked.relative_to, optical=optical)
+        frame, base = calibration.ends(asked.frame, asked.relative_to)
+        pose = calibration.mount(frame, base, axes=asked.axes, relative_axes=asked.relative_axes)
     except ValueError as error:
         refuse(mounting.position, f"{field}.mounting", str(error))
+    rig = sensor.get("rig")
+    is_unstated = asked.relative_axes is None and not calibration.frames[base].optical
+    if rig is not None and rig.text.endswith("_wrist") and is_unstated:
+        fact = (
+            f"the rig '{rig.text}' has X out of the hand; state the axes of '{base}': "
+            "relative_axes: hand (Z out of it, as of the link of a gripper) or body"
+        )
+        refuse(mounting.position, f"{field}.mounting.relative_axes", fact)
     return {
         name: _node(file.position, value)
         for name, value in place_of(pose, _UNITS[asked.unit]).items()
@@ -107,6 +118,62 @@ def _read(file: Node, field: str, *, fisheye: bool = False, rectified: bool = Fa
         message = f"{path}: {calibration.kind}; not used: {listed}"
         warnings.warn(message, errors.ConfigWarning, stacklevel=2)
     return calibration
+
+
+def _check_known_size(sensor: Node, camera: CalibratedCamera, field: str, file: Node) -> None:
+    """Refuse a calibration of images of unknown size, or whose middle is not in the sensor's.
+
+    Raises:
+        ConfigError: the size is unknown, or does not fit the principal point.
+    """
+    size = sensor.get("size_px")
+    if camera.size_px is not None:
+        return
+    if size is None:
+        fact = f"{file.text} does not state the size of its images; give size_px, its width first"
+        refuse(file.position, field, fact)
+    fact = _unfit_center(camera.center_px, size)
+    if fact:
+        fact = (
+            f"{fact}; expected size_px of the calibrated images, which {file.text} does not state"
+        )
+        refuse(size.position, field, fact)
+
+
+def _unfit_center(center_px: tuple[float, float], size: Node) -> str:
+    """The fact that a principal point is far from the middle of images; empty if it is not."""
+    sides = [one.content for one in size.items]
+    whole = [side for side in sides if isinstance(side, int) and side > 0]
+    if len(whole) != 2 or len(sides) != 2:
+        return ""
+    (cx, cy), (width, height) = center_px, whole
+    if max(abs(cx / width - 0.5), abs(cy / height - 0.5)) <= _OFF_CENTER:
+        return ""
+    place = f"the principal point ({cx:g}, {cy:g})"
+    return f"{place} is far from the middle of {width} x {height} pixels"
+
+
+def _warn_of_unfit_numbers(sensor: Node, field: str) -> None:
+    """Warn of typed intrinsics of images of another size than the sensor's."""
+    numbers, size = sensor.get("intrinsics"), sensor.get("size_px")
+    if numbers is None or numbers.get("size_px") is not None:
+        return
+    if size is None and (sensor.get("type") or sensor).content == "rgb_camera":
+        size = _node(numbers.position, list(RgbCamera.model_fields["size_px"].default))
+    center = [numbers.entries[key].content for key in ("cx_px", "cy_px") if numbers.get(key)]
+    if size is None or len(center) != 2 or not all(isinstance(c, (int, float)) for c in center):
+        return
+    cx, cy = (float(c) for c in center if isinstance(c, (int, float)))
+    fact = _unfit_center((cx, cy), size)
+    if fact:
+        message = (
+            f"{numbers.position}: {field}.intrinsics: {fact}; state size_px of the calibration"
+        )
+        warnings.warn(message, errors.ConfigWarning, stacklevel=3)
+
+
+_OFF_CENTER = 0.3
+"""Largest distance of a principal point from the middle, as a share of a side."""
 
 
 def _warn_of_swapped_size(camera: CalibratedCamera, file: str) -> None:
