@@ -14,7 +14,7 @@
   that occur in the data set are listed, with ids after the categories of things, with gaps: they
   are numbered among all categories of the program's families, because readers match a training
   and a test set by id, and the two seldom have the same scenery. Other categories (own assets)
-  come last, in alphabetical order of those that occur.
+  come last, as far as they occur, in alphabetical order.
 * **Void** are pixels of neither: ignored objects, annotated objects below the thresholds, and
   unannotated objects of a category of things (the hood of the ego vehicle): evaluation
   ignores predictions there.
