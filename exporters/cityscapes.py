@@ -55,6 +55,7 @@ from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.sensor_selection import (
     check_calibrations,
+    check_partner,
     pinhole_camera,
     require_channels,
     rgb_cameras,
@@ -102,6 +103,8 @@ class Cityscapes(base.AssetExporter):
                 f"exporter '{self.type}': right: '{self.right}' is not another camera that writes "
                 f"the rgb channel; expected one of: {', '.join(others) or 'none'}"
             )
+        if self.right:
+            check_partner(info, camera, self.right, self.type)
         check_calibrations(info, [camera, self.right] if self.right else [camera], self.type)
         check_frame_names(info, self.type)
 

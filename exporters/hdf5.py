@@ -14,7 +14,8 @@ normals                    float32 [h, w, 3]      ``(n + 1) / 2``, X right, Y up
                                                   0.5
 instance_segmaps           uint16 [h, w]          instance id; 0
 category_id_segmaps        uint16 [h, w]          category id; 0
-nocs                       float32 [h, w, 3]      position in the object's box, [0, 1]; 0
+nocs                       float32 [h, w, 4]      ``(p + 1) / 2`` for the position p in the object's
+                                                  frame [m], and 1; 0
 forward_flow,              float32 [h, w, 2]      displacement to the right and down [px]; NaN
 backward_flow
 instance_attribute_maps    JSON                   list: ``idx``, ``category_id``, ``name``, ... of
@@ -31,7 +32,10 @@ T_world_camera             float64 [4, 4]         pose; X right, Y down, Z forwa
 =========================  =====================  ================================================
 
 A channel that the camera does not write has no key; channels that BlenderProc does not have keep
-their names (``part``, ``disparity``, ...). ``K`` and ``cam_K`` refer to pixel centres at whole
+their names (``part``, ``disparity``, ...). ``nocs`` is in [0, 1] for objects within 1 m of their
+origin, and metric for all, as BlenderProc's ``render_nocs`` has it: positions are not scaled to the
+object's box, as ``object_coordinates`` of the shards are; its camera needs the channel
+``instance`` too. ``K`` and ``cam_K`` refer to pixel centres at whole
 numbers, as BlenderProc's do: the principal point is ours minus 0.5. Instances without an entry in
 ``instance_attribute_maps`` are not annotated. JSON texts are byte strings.
 
@@ -52,11 +56,13 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.reported import reported
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.exporters import base, fragments, image_files, npz
+from gen_data.core.scene import Scene
+from gen_data.exporters import base, fragments, image_files, npz, sensor_selection
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.lens_fields import lens_fields
 from gen_data.exporters.sequences import write_json
 
+NOCS = "nocs"
 KEYS = {
     Channel.RGB: "colors",
     Channel.Z_DEPTH: "depth",
@@ -64,7 +70,7 @@ KEYS = {
     Channel.NORMALS: "normals",
     Channel.INSTANCE: "instance_segmaps",
     Channel.CATEGORY: "category_id_segmaps",
-    Channel.OBJECT_COORDINATES: "nocs",
+    Channel.OBJECT_COORDINATES: NOCS,
     Channel.FLOW_FORWARD: "forward_flow",
     Channel.FLOW_BACKWARD: "backward_flow",
 }
@@ -99,12 +105,16 @@ class Hdf5(base.ExporterBase):
         """Reject a data set without images, or a machine without h5py.
 
         Raises:
-            ConfigError: no camera writes a channel, or the package is missing.
+            ConfigError: no camera writes a channel, one with object coordinates writes no
+                instances, or the package is missing.
         """
         if not any(info.media.values()):
             raise errors.ConfigError(
                 f"exporter '{self.type}': no camera writes a channel; add an rgb_camera"
             )
+        for camera, channels in info.media.items():
+            if Channel.OBJECT_COORDINATES in channels:
+                sensor_selection.require_channels(info, camera, [Channel.INSTANCE], self.type)
         missing = optional_packages.missing_packages("h5py")
         if self.container == "hdf5" and missing:
             raise errors.ConfigError(f"exporter 'hdf5' {missing}, or set container: npz")
@@ -127,6 +137,9 @@ class Hdf5(base.ExporterBase):
                     KEYS.get(c, c.value): _read(info, shard_dir, sample, camera, c)
                     for c in channels
                 }
+                if NOCS in arrays:
+                    ids = arrays[KEYS[Channel.INSTANCE]]
+                    arrays[NOCS] = _object_colors(arrays[NOCS], ids, sample.scene_of(camera))
                 arrays |= _camera_arrays(sample.truth[camera])
                 name = f"{sample.split}/{sample.index:09d}_{camera}.{self.container}"
                 self._write(folder / name, arrays)
@@ -202,6 +215,28 @@ def _read(
     if channel is Channel.NORMALS:
         pixels = ((pixels * BLENDER_AXES + 1.0) * 0.5).astype(np.float32)
     return pixels
+
+
+def _object_colors(
+    coordinates: NDArray[np.float32], ids: NDArray[np.uint16], scene: Scene
+) -> NDArray[np.float32]:
+    """BlenderProc's colours of positions in objects' frames, with an alpha, float32 [h, w, 4].
+
+    Args:
+        coordinates: Positions in the boxes of instances, [0, 1], [h, w, 3].
+        ids: Instance of each pixel [h, w]; 0 = none.
+        scene: The scene with their boxes.
+    """
+    top = max((thing.instance_id for thing in scene.instances), default=0)
+    low_m, size_m = np.zeros((2, max(top, int(ids.max(initial=0))) + 1, 3))
+    for thing in scene.instances:
+        low_m[thing.instance_id] = thing.box_min_m
+        size_m[thing.instance_id] = np.subtract(thing.box_max_m, thing.box_min_m)
+    position_m = low_m[ids] + coordinates * size_m[ids]
+    there = (ids > 0)[..., None]
+    colors = np.concatenate([0.5 * position_m + 0.5, np.ones_like(position_m[..., :1])], axis=-1)
+    found: NDArray[np.float32] = np.where(there, colors, 0.0).astype(np.float32)
+    return found
 
 
 def _camera_arrays(truth: ImageTruth) -> dict[str, NDArray[Any]]:

@@ -50,7 +50,7 @@ class KittiStereo(base.ExporterBase):
     left: str = ""
     """Sensor that is image_2; empty = the first one, by name, that writes disparities."""
     right: str = ""
-    """Sensor that is image_3; empty = the only other one that writes the rgb channel."""
+    """Sensor that is image_3; empty = the camera of the left one's disparities."""
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -114,12 +114,14 @@ class KittiStereo(base.ExporterBase):
                 "channels and name its partner with stereo_with"
             )
         others = [name for name in known if name != left]
-        right = self.right or (others[0] if len(others) == 1 else "")
+        partner = info.sensor(left).stereo_with
+        right = self.right or partner or (others[0] if len(others) == 1 else "")
         if right not in others:
             raise errors.ConfigError(
                 f"exporter '{self.type}': right: '{right}' is not another camera that writes the "
                 f"rgb channel; expected one of: {', '.join(others) or 'none'}"
             )
+        sensor_selection.check_partner(info, left, right, self.type)
         return {
             "02": sensor_selection.pinhole_camera(info, left, self.type),
             "03": sensor_selection.pinhole_camera(info, right, self.type),

@@ -120,6 +120,20 @@ def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
     return camera
 
 
+def check_partner(info: DatasetInfo, left: str, right: str, exporter: str) -> None:
+    """Reject a right camera that is not the one of the left camera's disparities.
+
+    Raises:
+        ConfigError: disparities to another camera have another baseline.
+    """
+    partner = info.sensor(left).stereo_with
+    if partner and right != partner:
+        raise ConfigError(
+            f"exporter '{exporter}': right: the disparities of '{left}' are to the camera "
+            f"'{partner}' (stereo_with), not to '{right}'; expected '{partner}'"
+        )
+
+
 def laser_scanner(info: DatasetInfo, wanted: str, exporter: str) -> str:
     """Find the laser scanner of a name; for an empty name the first one, or empty if there is none.
 

@@ -406,6 +406,7 @@ class SensorInfo:
         needs_clear_view: Whether a position inside the body that carries it is refused.
         faults: Kinds of errors in its readings: ``clock``, ``extrinsics``, ``lost``,
             ``doubled``.
+        stereo_with: Cameras: the right camera of its disparities; empty = unknown, or none.
     """
 
     name: str
@@ -422,6 +423,7 @@ class SensorInfo:
     origins: bool = False
     motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
     faults: tuple[str, ...] = field(default=(), metadata={serialization.SPARSE: True})
+    stereo_with: str = field(default="", metadata={serialization.SPARSE: True})
 
 
 class Sensor(Protocol):

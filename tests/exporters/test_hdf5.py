@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.hdf5 import Hdf5
 from tests.exporters.conftest import MEDIA, SIZES_M
 
@@ -145,3 +146,45 @@ def test_each_camera_has_a_container_whose_keys_are_blenderprocs_or_our_names(
     names = sorted(p.name for p in (root / "train").iterdir())
     assert names[:2] == ["000000000_left.hdf5", "000000000_right.hdf5"]
     assert len(names) == 8
+
+
+@pytest.mark.parametrize("container", CONTAINERS)
+def test_nocs_are_positions_in_the_objects_frame_as_blenderprocs(
+    container: str, world: Any, tmp_path: Path
+) -> None:
+    """Render_nocs of BlenderProc 2: half the position [m] in the object's frame plus 0.5.
+
+    With an alpha of 1; the background is 0. Through depth, K and pose, they lead to the same place.
+    """
+    sample = world.samples[0]
+    reading = sample.capture.readings["color"]
+    ids = reading.channels[Channel.INSTANCE]
+    camera = reading.camera
+    rows, columns = np.indices(ids.shape)
+    rays = camera.intrinsics.rays(np.stack([columns, rows], -1).reshape(-1, 2) + 0.5)
+    rays = rays / rays[:, 2:]
+    depth_m = np.nan_to_num(reading.channels[Channel.Z_DEPTH], posinf=0.0)
+    p_world = camera.T_world_camera.apply(rays * depth_m.reshape(-1, 1)).reshape(*ids.shape, 3)
+    shares, expected = np.zeros((2, *ids.shape, 3))
+    for thing in sample.scene.instances:
+        here = ids == thing.instance_id
+        local = thing.T_world_instance.inverse().apply(p_world[here])
+        expected[here] = 0.5 * local + 0.5
+        shares[here] = (local - thing.box_min_m) / np.subtract(thing.box_max_m, thing.box_min_m)
+    channels = {**reading.channels, Channel.OBJECT_COORDINATES: shares.astype(np.float32)}
+    capture = replace(sample.capture, readings={"color": replace(reading, channels=channels)})
+    info = world.info(1, media={"color": (*MEDIA, Channel.OBJECT_COORDINATES)})
+    given = [replace(sample, capture=capture)]
+    folder = world.export(Hdf5(container=container), info, given, tmp_path)
+    nocs = load(next(folder.rglob("0*")))["nocs"]
+    assert (nocs.dtype, nocs.shape) == (np.float32, (*ids.shape, 4))
+    np.testing.assert_array_equal(nocs[..., 3], ids > 0)
+    # 16 bits over a box of 4 m, halved; rays that graze the edge of a box leave it by rounding.
+    np.testing.assert_allclose(nocs[..., :3], expected, atol=2e-4)
+    assert nocs.max() > 1.2
+
+
+def test_nocs_need_instances(world: Any) -> None:
+    info = world.info(1, media={"color": (Channel.RGB, Channel.OBJECT_COORDINATES)})
+    with pytest.raises(ConfigError, match="does not write the channel instance"):
+        Hdf5(container="npz").check(info)

@@ -12,7 +12,9 @@ from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import Modality, SensorInfo
 from gen_data.core.se3 import SE3
+from gen_data.exporters.cityscapes import Cityscapes
 from gen_data.exporters.kitti_stereo import KittiStereo
+from gen_data.sensors.camera.rgb_camera import RgbCamera
 from tests.exporters.drives import calibration
 
 BASELINE_M = 0.54
@@ -144,3 +146,29 @@ def test_data_sets_without_a_rectified_pair_are_refused(world: Any, tmp_path: Pa
     wrong = replace(samples[0], scene=replace(scene, cameras=cameras))
     with pytest.raises(ConfigError, match=r"'left' and 'right' are not a rectified pair: .*below"):
         world.export(KittiStereo(), info, [wrong], tmp_path)
+
+
+@pytest.mark.parametrize(("right", "fits"), [("", True), ("right", True), ("far", False)])
+def test_the_right_camera_is_that_of_the_disparities(right: str, fits: bool, world: Any) -> None:
+    """Depth from disparity is focal length times the pair's baseline, whatever else is parallel."""
+    info, _ = world.pairs()
+    (left,) = (s for s in info.sensors if s.name == "left")
+    others = [s for s in info.sensors if s.name != "left"]
+    (partner,) = (s for s in others if s.name == "right")
+    left = replace(left, stereo_with="right", channels=(*left.channels, Channel.INSTANCE))
+    sensors = (left, *others, replace(partner, name="far"))
+    info = replace(info, sensors=sensors)
+    exporters = [KittiStereo(left="left", right=right)]
+    exporters += [Cityscapes(camera="left", right=right)] if right else []
+    for exporter in exporters:
+        if fits:
+            exporter.check(info)
+        else:
+            with pytest.raises(ConfigError, match=r"are to the camera 'right'.*not to 'far'"):
+                exporter.check(info)
+
+
+def test_a_camera_states_the_partner_of_its_disparities() -> None:
+    fields: dict[str, Any] = {"name": "left", "stereo_with": "right"}
+    assert RgbCamera(**fields, channels=("rgb", "disparity")).describe().stereo_with == "right"
+    assert RgbCamera(**fields, channels=("rgb",)).describe().stereo_with == ""

@@ -165,8 +165,14 @@ class RgbCamera(Mounted):
         """Describe a camera with the channels that it writes."""
         lens = self.nominal_intrinsics().lens.model
         encoding = self.rgb_encoding.described()
+        partner = self.stereo_with if PAIRED & set(self.media) else ""
         return self._info(
-            self.name, Modality.CAMERA, channels=self.media, lens=lens, rgb_encoding=encoding
+            self.name,
+            Modality.CAMERA,
+            channels=self.media,
+            lens=lens,
+            rgb_encoding=encoding,
+            stereo_with=partner,
         )
 
     def mount(self, scene: Scene) -> Scene:
