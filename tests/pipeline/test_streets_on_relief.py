@@ -112,11 +112,11 @@ def test_borders_are_hidden_by_crests_and_by_cars_uphill_and_downhill(
 
 @pytest.mark.slow
 def test_points_of_a_scan_lie_on_the_ground_of_hills() -> None:
-    """A scanner without noise measures the distance at which its rays meet the ground."""
+    """A scanner without noise and with narrow beams measures where its rays meet the ground."""
     sensors = (
         "sensors.image_02.size_px=[64, 32]", "sensors.image_03.size_px=[64, 32]",
         "sensors.velodyne.ideal=true", "sensors.velodyne.motion_distortion=none",
-        "sensors.velodyne.model=VLP-16",
+        "sensors.velodyne.model=VLP-16", "sensors.velodyne.divergence=false",
     )  # fmt: skip
     config = thin_street("kitti_rig.yaml", *STREET[:-1], *HILLS, *sensors, "steps_per_scene=1")
     with open_pipeline(config) as pipeline:
