@@ -24,3 +24,14 @@ FEW = (
 def thin_street(config: str, *overrides: str, without: Sequence[str] = ()) -> Config:
     """A shipped street with two parked cars, two cars in traffic, a cyclist and two people."""
     return load_config(config, overrides=(*FEW, *overrides), without=(*SCENERY, *without))
+
+
+STRAIGHT = (
+    "shared.district=residential", "shared.junction=none", "shared.course=straight",
+    "shared.course_on=straight", "shared.landmark=none", "randomizers.parked.count=8",
+    "randomizers.traffic.count=8", "randomizers.people.count=12",
+)  # fmt: skip
+HILLS = (
+    "randomizers.relief.grade={uniform: [-0.12, 0.12]}",
+    "randomizers.relief.side_slope={uniform: [-0.15, 0.15]}",
+)

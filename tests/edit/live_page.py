@@ -1,4 +1,4 @@
-"""The live page in Chromium: its server, and what tests do in the page."""
+"""The live page in Chromium: its server, and how tests use the page."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Live:
 
 @contextmanager
 def served(folder: Path, *arguments: str, **environment: str) -> Iterator[str]:
-    """The address of a page of its own process."""
+    """The address of a page that another process serves."""
     command = [sys.executable, "-m", "gen_data", "edit", *arguments, "--no-browser", "-w", "1"]
     # NiceGUI serves its own test port where it sees pytest.
     variables = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "NICEGUI"))}
@@ -170,6 +170,18 @@ def type_behind(page: Page, text: str, typed: str) -> None:
     """Put the cursor behind a text of a line, and type."""
     put_cursor(page, text)
     page.keyboard.type(typed)
+
+
+def wait_for_text(page: Page, text: str) -> None:
+    """Until the editor shows a text."""
+    shown = "document.querySelector('.cm-content').textContent"
+    page.wait_for_function(f"text => {shown}.includes(text)", arg=text)
+
+
+def choose_picture(page: Page, name: str) -> None:
+    """Choose the kind of picture in all tiles."""
+    page.click("label:has-text('picture') >> nth=0")
+    page.click(f".q-item:has-text('{name}')")
 
 
 def pictures(page: Page) -> list[bytes]:

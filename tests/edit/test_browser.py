@@ -22,12 +22,14 @@ from tests.edit.live_page import (
     LINES,
     TEXT,
     Live,
+    choose_picture,
     pictures,
     put_cursor,
     set_text,
     text_of,
     type_behind,
     wait_for_pictures,
+    wait_for_text,
 )
 
 if TYPE_CHECKING:
@@ -37,7 +39,7 @@ pytestmark = pytest.mark.slow
 
 
 def save(page: Page) -> None:
-    """By the key, until the page says so."""
+    """By the key, until the page shows it."""
     page.keyboard.press("Control+s")
     page.wait_for_selector("[role=status]:text-is('saved')")
 
@@ -108,9 +110,9 @@ def test_controls_and_layers_change_the_pictures(page: Page) -> None:
     page.mouse.down()
     page.mouse.move(place["x"] + 60, place["y"] + 5, steps=4)
     page.mouse.up()
-    page.wait_for_function("document.querySelector('.cm-content').textContent.includes('scale: ')")
+    wait_for_text(page, "scale: ")
     wait_for_pictures(page, before)
-    # Values on the way of the slider have pictures, too: those of the last one stay.
+    # Values on the way of the slider have pictures, too; pictures of the last value stay.
     drawn: list[bytes] = []
     while drawn != pictures(page):
         page.wait_for_function(DRAWN)
@@ -134,9 +136,7 @@ def test_sliders_follow_a_text_that_is_typed(page: Page) -> None:
     page.keyboard.type(", scale: {uniform: [0.9, 1.2")
     page.wait_for_selector("[data-field=scale] [aria-valuenow='0.9|1.2']")
     slider.locator(".q-slider__thumb").first.press("ArrowRight")
-    page.wait_for_function(
-        "document.querySelector('.cm-content').textContent.includes('{uniform: [0.91, 1.2]}')"
-    )
+    wait_for_text(page, "{uniform: [0.91, 1.2]}")
     put_cursor(page, "[0.91, 1.2")
     page.keyboard.type("5")
     page.wait_for_selector("[data-field=scale] [aria-valuenow='0.91|1.25']")
@@ -148,25 +148,19 @@ def test_sliders_follow_a_text_that_is_typed(page: Page) -> None:
     least = page.locator("[data-field=scale] [data-end=min]")
     assert least.input_value() == "0.91"
     least.fill("0.8")
-    page.wait_for_function(
-        "document.querySelector('.cm-content').textContent.includes('{uniform: [0.8, 17.25]}')"
-    )
+    wait_for_text(page, "{uniform: [0.8, 17.25]}")
     page.locator("[data-field=scale] [data-end=max]").fill("1.5")
-    page.wait_for_function(
-        "document.querySelector('.cm-content').textContent.includes('{uniform: [0.8, 1.5]}')"
-    )
+    wait_for_text(page, "{uniform: [0.8, 1.5]}")
     page.wait_for_selector("[data-field=scale] [aria-valuenow='0.8|1.5']")
     # A number that is typed next to a slider goes into the text, too.
     count = page.locator("[data-field=count] input")
     count.fill("21")
-    page.wait_for_function(
-        "document.querySelector('.cm-content').textContent.includes('count: 21,')"
-    )
+    wait_for_text(page, "count: 21,")
     assert float(page.locator("[data-field=count] .q-slider").get_attribute("aria-valuemax")) >= 21
 
 
 def test_controls_do_not_overwrite_a_text_with_faults(page: Page) -> None:
-    """They show the latest valid text: the message asks to correct the other."""
+    """They show the latest valid text: the message asks to correct the faulty one."""
     put_cursor(page, "count: 3")
     slider = page.locator("[data-field=scale] .q-slider")
     slider.wait_for()
@@ -191,18 +185,11 @@ def test_each_view_has_the_pictures_that_the_library_draws(live: Live, page: Pag
         shown = [studio.show(replace(order, index=k, view=view)).jpeg for k in range(4)]
         assert pictures(page) == shown
 
-    def choose(name: str) -> None:
-        page.click("label:has-text('picture') >> nth=0")
-        page.click(f".q-item:has-text('{name}')")
-
-    expect(replace(start, kind="depth"), lambda: choose("depth"))
-    expect(replace(start, kind="normals"), lambda: choose("normals"))
-    expect(start, lambda: choose("photograph"))
+    expect(replace(start, kind="depth"), partial(choose_picture, page, "depth"))
+    expect(replace(start, kind="normals"), partial(choose_picture, page, "normals"))
+    expect(start, partial(choose_picture, page, "photograph"))
     layers: frozenset[str] = start.layers
-    for layer in ("keypoints", "boxes3d"):
-        layers ^= {layer}
-        expect(replace(start, layers=layers), partial(page.click, f"[data-layer={layer}]"))
-    for layer in ("keypoints", "boxes3d"):
+    for layer in ("keypoints", "boxes3d") * 2:
         layers ^= {layer}
         expect(replace(start, layers=layers), partial(page.click, f"[data-layer={layer}]"))
 
@@ -218,16 +205,14 @@ def test_kinds_of_labels_without_any_are_told(page: Page) -> None:
     page.click("[data-layer=lanes]")
     page.click("[data-layer=text]")
     page.wait_for_selector(".gd-empty", state="hidden")
-    page.click("label:has-text('picture') >> nth=0")
-    page.click(".q-item:has-text('LiDAR from above')")
+    choose_picture(page, "LiDAR from above")
     page.wait_for_selector(".gd-empty:text-is('these samples have no LiDAR from above')")
-    page.click("label:has-text('picture') >> nth=0")
-    page.click(".q-item:has-text('photograph')")
+    choose_picture(page, "photograph")
     page.wait_for_selector(".gd-empty", state="hidden")
 
 
 def test_a_file_that_another_program_changes_or_deletes_is_told(live: Live, page: Page) -> None:
-    """Within a few seconds; saving asks, and writes the text of the page."""
+    """Within a few seconds; saving asks, and writes the text that the page has."""
     (live.folder / "mine.yaml").write_text("seed: 3\n")
     page.wait_for_selector("[role=status]:text-is('not saved: the file has changed on disk')")
     (live.folder / "mine.yaml").unlink()
@@ -253,16 +238,14 @@ def test_a_scanner_has_its_view_from_above(live: Live, page: Page) -> None:
     set_text(page, text)
     wait_for_pictures(page, before)
     before = page.evaluate(COUNTS)
-    page.click("label:has-text('picture') >> nth=0")
-    page.click(".q-item:has-text('LiDAR from above')")
+    choose_picture(page, "LiDAR from above")
     wait_for_pictures(page, before)
     page.wait_for_function(DRAWN)
     studio, order = Studio(), Order(text, str(live.folder / "mine.yaml"), 0, View("scan"))
     shown = [studio.show(replace(order, index=k)) for k in range(4)]
     assert {one.sensors["pseudo_lidar"] for one in shown} == {"scan"}
     assert pictures(page) == [one.jpeg for one in shown]
-    page.click("label:has-text('picture') >> nth=0")
-    page.click(".q-item:has-text('photograph')")
+    choose_picture(page, "photograph")
 
 
 def test_a_text_is_saved_under_another_name(live: Live, page: Page) -> None:
@@ -308,7 +291,7 @@ def test_a_sample_in_full_size_has_its_draws_and_a_recording(live: Live, page: P
     page.wait_for_selector(".q-dialog img[data-full=ready]")
     from gen_data.lab.edit.panels import object_rows  # It needs NiceGUI.
 
-    # Sizes are those of the picture in full size.
+    # Sizes are as in the picture in full size.
     shown = Studio().show(Order(text_of(page), str(live.folder / "mine.yaml"), 1, View(), (), 0))
     cells = page.locator(".q-dialog table").first.locator("td").all_inner_texts()
     assert cells == [cell for row in object_rows(shown) for cell in row]
@@ -370,7 +353,7 @@ def test_a_scene_that_cannot_settle_is_told_and_the_page_lives(page: Page) -> No
 
 
 def test_keys_of_a_lost_connection_are_not_lost(live: Live, page: Page) -> None:
-    """Typed while the server is out of reach: the page begins anew when it is back, with them."""
+    """The page begins anew with the typed text when the server is within reach again."""
     page.evaluate("window.socket.disconnect()")
     type_behind(page, "# My table", " again")
     page.evaluate("window.socket.connect()")
@@ -404,7 +387,7 @@ def test_unsaved_text_outlives_a_reload(live: Live, page: Page) -> None:
 
 
 def test_the_second_of_two_tabs_to_save_is_asked(live: Live, page: Page) -> None:
-    """Each has its own text; the second may take that of the file, or write over it."""
+    """Each keeps a text; the second may take the file's, or write over it."""
     with live.tab("?open=mine.yaml") as other:
         other.wait_for_selector(".gd-tile[data-shown]")
         type_behind(other, "# My table", ", other")

@@ -64,7 +64,7 @@ def tickets(client: str, count: int) -> list[Ticket]:
 
 
 def test_newer_jobs_replace_those_that_wait() -> None:
-    """And those that run are outdated; a result of theirs reaches nobody."""
+    """Running jobs become outdated, too; their results reach nobody."""
     queue = Queue()
     queue.replace("a", tickets("a", 3))
     running = queue.take()
@@ -88,7 +88,7 @@ def test_tabs_take_turns() -> None:
 
 
 def test_a_check_waits_for_the_pictures_of_all_tabs() -> None:
-    """Also for those that are ordered after it; a tab that is forgotten may order at once again."""
+    """Also for pictures ordered after it; a tab that is forgotten may order at once again."""
     queue = Queue()
     queue.replace("a/check", tickets("a/check", 1), later=True)
     queue.replace("a", tickets("a", 2))
@@ -120,7 +120,7 @@ def ask(
     hosts: frozenset[str] = frozenset({"127.0.0.1:80"}),
     **headers: str,
 ) -> tuple[list[MutableMapping[str, Any]], bool]:
-    """What a guard sends for a request, and whether the request has reached the page."""
+    """Messages that a guard sends for a request, and whether the request has reached the page."""
     reached: list[bool] = []
     sent: list[MutableMapping[str, Any]] = []
 
@@ -197,7 +197,7 @@ def make_session(tmp_path: Path, text: str) -> Session:
 
 
 def test_pictures_stay_until_newer_ones_come(tmp_path: Path) -> None:
-    """A text with a fault orders none, and marks those that are shown as outdated."""
+    """A text with a fault orders none, and marks shown pictures as outdated."""
     session = make_session(tmp_path, "extends: tabletop.yaml\n")
     orders = session.orders()
     assert [order.index for order in orders] == [0, 5, 10, 15, 20, 25, 30, 35]
@@ -277,7 +277,7 @@ def test_a_text_without_a_file_is_not_saved_until_there_is_one(tmp_path: Path) -
 
 
 def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The message is that of the system, and is no question to reload or overwrite."""
+    """The system's message, and no question to reload or overwrite."""
     path = tmp_path / "a.yaml"
     path.write_text("seed: 1\n")
     session = Session(read_file(path), Folders((tmp_path,)))
@@ -300,7 +300,7 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_file_that_another_program_changes_or_deletes_is_told(tmp_path: Path) -> None:
-    """Saving asks first; written again, it is as the editor has it."""
+    """Saving asks first; written again, it has the editor's text."""
     path = tmp_path / "a.yaml"
     path.write_text("seed: 1\n")
     session = Session(read_file(path), Folders((tmp_path,)))

@@ -13,21 +13,7 @@ import gen_data
 from gen_data.api.open_dataset import RecipeSamples
 from gen_data.core.serialization import canonical_json
 from gen_data.pipeline.pipeline import Pipeline
-from tests.end_to_end.test_recipes import BLOCK, CONFIG, N
-
-CAMERA = CONFIG.replace("annotations: [boxes2d]", "annotations: [boxes2d, instance_masks, poses]")
-
-
-@pytest.fixture(scope="module")
-def author(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with a finished data set and its recipe."""
-    folder = tmp_path_factory.mktemp("author")
-    (folder / "tiny.yaml").write_text(CAMERA)
-    (folder / "meshes").mkdir()
-    (folder / "meshes" / "block.obj").write_text(BLOCK)
-    gen_data.generate(folder / "tiny.yaml", N, out=folder / "set", workers=0)
-    (folder / "recipe.yaml").write_text(gen_data.recipe(folder / "set"))
-    return folder
+from tests.end_to_end.conftest import N
 
 
 @pytest.fixture(autouse=True)

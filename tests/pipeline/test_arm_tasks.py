@@ -1,7 +1,8 @@
 """Every task of the table is demonstrated, and physics confirms it."""
 
 import shutil
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from itertools import groupby
 from pathlib import Path
 
@@ -12,13 +13,17 @@ from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory, open_pipeline
 from gen_data.core.errors import ConfigError, SceneRejected
 from gen_data.core.sample import Sample
-from gen_data.core.scene import Scene
+from gen_data.core.scene import Episode, Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.core.serialization import canonical_json
+from gen_data.pipeline import Pipeline
 from gen_data.randomizers.arm_task_table import tasks
 from tests.tiers import cases, exhaustive
 
 SMALL = ("sensors.color.size_px=[96,72]", "sensors.wrist.size_px=[96,72]")
+THINGS = "randomizers.things"
+THING = "things/0"
+"""Name of the first body that an arm moves."""
 OWN = """nudge:
   instruction: Nudge the {thing}.
   things: {thing: {assets: {red block: "box?color=red&size_m=0.06,0.06,0.06"}, mass_kg: 0.2}}
@@ -31,24 +36,50 @@ OWN = """nudge:
 """
 JOINTS = (("z", 0.0), ("y", 0.2), ("y", 0.4), ("z", 0.2), ("y", 0.2), ("z", 0.08))
 """Axis of every joint of ``my_arm``, and its height above the one before [m]."""
-NONE_FAIL = ("randomizers.things.failures={}", "shared.robot=franka_panda")
 
 
-def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene:
+@contextmanager
+def demonstrating(task: str, *changes: str, failures: str = "{}") -> Iterator[Pipeline]:
+    """A pipeline of the configuration that has the arms for a task."""
     config = "arm_pair.yaml" if tasks()[task].arms else "arm_tasks.yaml"
     robot = "franka_panda_suction" if tasks()[task].hand == "suction" else "franka_panda"
-    changes = (
-        f"shared.task={task}",
-        f"randomizers.things.failures={failures}",
-        f"shared.robot={robot}",
+    given = (
+        f"shared.task={task}", f"shared.robot={robot}", f"{THINGS}.failures={failures}", *changes
+    )  # fmt: skip
+    with open_pipeline(load_config(config, overrides=(*SMALL, *given))) as pipeline:
+        yield pipeline
+
+
+def demonstrated(task: str, *changes: str, failures: str = "{}") -> Scene:
+    with demonstrating(task, *changes, failures=failures) as pipeline:
+        return pipeline.accepted_scene(0).scene
+
+
+def user_config(
+    folder: Path, task: str, robot: str = "franka_panda", things: str = "", more: str = ""
+) -> str:
+    """Path of a user's configuration of a task, with fields of its randomizer and of the whole."""
+    config = folder / "config.yaml"
+    config.write_text(
+        f"extends: arm_tasks\n{more}shared: {{robot: {{choice: {{{robot}: 1}}}}, "
+        f"task: {{choice: {{{task}: 1}}}}}}\n"
+        f"randomizers:\n  - {{name: things{things}, failures: {{}}}}\n"
     )
-    with open_pipeline(load_config(config, overrides=(*SMALL, *changes))) as pipeline:
-        return pipeline.accepted_scene(scene_index).scene
+    return str(config)
+
+
+def first_scene(config: str) -> Scene:
+    with open_pipeline(load_config(config, overrides=SMALL)) as pipeline:
+        return pipeline.accepted_scene(0).scene
+
+
+def episode_of(scene: Scene) -> Episode:
+    episode = scene.articulations[0].episode
+    assert episode is not None
+    return episode
 
 
 QUICK = ("open_drawer",)
-
-
 SLOW = ("hold_and_open", "lift_tray", "pass_rod", "pivot", "stack", "stir")
 
 
@@ -60,9 +91,8 @@ SLOW = ("hold_and_open", "lift_tray", "pass_rod", "pivot", "stack", "stir")
     ],
 )
 def test_every_task_is_demonstrated_with_success(task: str) -> None:
-    """Its phases are those of the program; things are named in the instruction, not braced."""
-    scene = demonstrated(task)
-    arm = scene.articulations[0]
+    """It has the phases of the program; its instruction names objects, without braces."""
+    arm = demonstrated(task).articulations[0]
     assert arm.episode is not None
     assert arm.assignment is not None
     assert (arm.assignment.name, arm.episode.succeeded, arm.episode.failure) == (task, True, "")
@@ -82,12 +112,11 @@ def test_a_rod_passes_from_one_hand_to_the_other() -> None:
     The rod of 3 cm is at least 15 cm above the plate while both touch it.
     """
     scene = demonstrated("pass_rod")
-    episode = scene.articulations[0].episode
-    assert episode is not None
+    episode = episode_of(scene)
     (first, other) = episode.held
-    assert first.label == other.label == "things/0"
+    assert first.label == other.label == THING
     assert first.start_s < other.start_s < first.end_s < other.end_s
-    track = scene.track("things/0")
+    track = scene.track(THING)
     assert track is not None
     heights = [track.pose(t).translation_m[2] for t in (other.start_s, first.end_s)]
     assert min(heights) > 0.74 + 0.15
@@ -98,13 +127,12 @@ def test_a_rod_passes_from_one_hand_to_the_other() -> None:
 def test_a_tray_stays_level_between_two_hands_and_in_both() -> None:
     """Hands move as one: the distance between them and each one's pose on the tray never change."""
     scene = demonstrated("lift_tray")
-    episode = scene.articulations[0].episode
-    assert episode is not None
+    episode = episode_of(scene)
     lift = next(span for span in episode.phases if span.label == "lift")
     relative = []
     for share in (0.05, 0.3, 0.6, 1.0):
         at = scene_at(scene, lift.start_s + share * (lift.end_s - lift.start_s))
-        tray = at.body("things/0").T_world_body
+        tray = at.body(THING).T_world_body
         hands = [at.body(f"{arm}/panda_hand").T_world_body for arm in ("arm", "right")]
         relative.append([v for h in hands for v in (tray.inverse() @ h).translation_m])
         up = tray.rotation()[:, 2]
@@ -125,33 +153,28 @@ def test_a_task_of_two_arms_is_refused_with_one() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("failure", ["slip", "miss", "collision"])
 def test_failures_are_drawn_by_their_share(failure: str) -> None:
-    """A share of 1 fails always; the label says how."""
-    episode = demonstrated("stack", failures=f"{{{failure}: 1}}").articulations[0].episode
-    assert episode is not None
+    """A share of 1 fails always; the label names the cause."""
+    episode = episode_of(demonstrated("stack", failures=f"{{{failure}: 1}}"))
     assert (episode.succeeded, episode.failure) == (False, failure)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["kuka_iiwa_gripper", "xarm6_gripper"])
 def test_arms_with_made_fingers_put_things_down_where_they_should(robot: str) -> None:
-    """The fingers are those of ``robot_tools``; physics confirms the place."""
-    changes = ("shared.task=pick_and_place", NONE_FAIL[0], f"shared.robot={robot}")
-    with open_pipeline(load_config("arm_tasks.yaml", overrides=(*SMALL, *changes))) as pipeline:
-        (arm,) = pipeline.accepted_scene(0).scene.articulations
-    assert arm.episode is not None
-    assert arm.episode.succeeded
-    assert any("tool_left_finger + things/0" in span.label for span in arm.episode.contacts)
+    """``robot_tools`` makes the fingers; physics confirms the place."""
+    episode = episode_of(demonstrated("pick_and_place", f"shared.robot={robot}"))
+    assert episode.succeeded
+    assert any(f"tool_left_finger + {THING}" in span.label for span in episode.contacts)
 
 
 @pytest.mark.slow
 def test_a_thing_that_pivots_is_pressed_by_the_mat_and_turns_in_the_hand() -> None:
     """Held while it turns by 55 degrees; the mat pushes with the pads' torque over the lever arm.
 
-    At the beginning the edge is 0.035 sin 35 deg - 0.0175 cos 35 deg = 5.7 mm beside the axis, so
+    At the beginning the edge is 0.035 sin 35 deg - 0.0175 cos 35 deg = 5.7 mm from the axis, so
     that 0.05 N m take 8.7 N; the lever only grows from there.
     """
-    episode = demonstrated("pivot").articulations[0].episode
-    assert episode is not None
+    episode = episode_of(demonstrated("pivot"))
     pivot = next(span for span in episode.phases if span.label == "pivot")
     (held,) = episode.held
     assert held.start_s < pivot.start_s
@@ -159,7 +182,7 @@ def test_a_thing_that_pivots_is_pressed_by_the_mat_and_turns_in_the_hand() -> No
     (pressed,) = [
         span
         for span in episode.contacts
-        if span.label == "things/0 + things/1"
+        if span.label == f"{THING} + things/1"
         and span.start_s < pivot.end_s < span.end_s + 1.0
         and span.start_s <= pivot.start_s + 0.1
     ]
@@ -168,26 +191,21 @@ def test_a_thing_that_pivots_is_pressed_by_the_mat_and_turns_in_the_hand() -> No
 
 
 def test_tasks_of_a_users_file_are_demonstrated(tmp_path: Path) -> None:
-    """``tasks`` names a file beside the configuration; faults in it have its line and column."""
+    """``tasks`` names a file next to the configuration; faults have its line and column."""
     table = tmp_path / "mine.yaml"
     table.write_text(OWN)
-    config = tmp_path / "config.yaml"
-    config.write_text(
-        "extends: arm_tasks\nshared: {robot: {choice: {franka_panda: 1}}, task: {choice: "
-        "{nudge: 1}}}\nrandomizers:\n  - {name: things, tasks: mine.yaml, failures: {}}\n"
-    )
-    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline:
-        (arm,) = pipeline.accepted_scene(0).scene.articulations
+    config = user_config(tmp_path, "nudge", things=", tasks: mine.yaml")
+    (arm,) = first_scene(config).articulations
     assert arm.assignment is not None
     assert arm.assignment.instruction == "Nudge the red block."
     table.write_text(OWN.replace("at_least", "at_leest"))
     with pytest.raises(
         ConfigError, match=r"(?s)mine.yaml:9:36: .*tasks.nudge.success\[0\].at_leest"
     ):
-        load_config(str(config))
+        load_config(config)
     table.unlink()
     with pytest.raises(ConfigError, match=r"config.yaml:4:27: tasks: there is no file of tasks"):
-        load_config(str(config))
+        load_config(config)
 
 
 @pytest.mark.slow
@@ -203,20 +221,15 @@ def test_a_cup_lifts_what_its_force_bears(tmp_path: Path, mass_kg: float, holds:
   success: [{{measure: tilt, body: it, at_most: 0.1}}]
 """
     )
-    config = tmp_path / "config.yaml"
-    config.write_text(
-        "extends: arm_tasks\nphysics: {layout_attempts_max: 1}\nshared: {robot: {choice: "
-        "{franka_panda_suction: 1}}, task: {choice: {suck: 1}}}\n"
-        "randomizers:\n  - {name: things, tasks: mine.yaml, failures: {}, speed: 0.1}\n"
-    )
-    expected = nullcontext() if holds else pytest.raises(SceneRejected, match="bear the load")
-    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline, expected:
-        (arm,) = pipeline.accepted_scene(0).scene.articulations
-        assert arm.episode is not None
-        assert [span.label for span in arm.episode.held] == ["things/0"]
+    config = user_config(
+        tmp_path, "suck", "franka_panda_suction", ", tasks: mine.yaml, speed: 0.1",
+        "physics: {layout_attempts_max: 1}\n",
+    )  # fmt: skip
+    with nullcontext() if holds else pytest.raises(SceneRejected, match="bear the load"):
+        assert [span.label for span in episode_of(first_scene(config)).held] == [THING]
 
 
-def my_arm(limit: str = '<limit lower="-2.9" upper="2.9" velocity="2"/>') -> str:
+def my_arm() -> str:
     """A URDF of boxes: six joints and a flange, but no hand."""
     axes = {"y": "0 1 0", "z": "0 0 1"}
     links, joints = ['<link name="link0"/>'], []
@@ -232,35 +245,25 @@ def my_arm(limit: str = '<limit lower="-2.9" upper="2.9" velocity="2"/>') -> str
         joints.append(
             f'<joint name="joint{k + 1}" type="revolute"><parent link="link{k}"/>'
             f'<child link="link{k + 1}"/><origin xyz="0 0 {rise_m}"/>'
-            f'<axis xyz="{axes[axis]}"/>{limit}</joint>'
+            f'<axis xyz="{axes[axis]}"/><limit lower="-2.9" upper="2.9" velocity="2"/></joint>'
         )
     return f'<robot name="my_arm">{"".join(links + joints)}</robot>'
 
 
-def own_arm(folder: Path, urdf: str) -> Path:
-    """A configuration with a user's arm, on whose flange fingers are made."""
-    (folder / "arms").mkdir()
-    (folder / "arms/my_arm.urdf").write_text(urdf)
-    (folder / "arms/assets.yaml").write_text(
-        "robots:\n  - id: my_arm\n    file: my_arm.urdf\n"
-        "    home: {joint2: 0.3, joint3: 1.2, joint5: 1.6}\n"
-        "    tool: {kind: fingers, flange: link6, offset_m: 0.04}\n"
-    )
-    config = folder / "config.yaml"
-    config.write_text(
-        "extends: arm_tasks\nassets: {folders: [arms]}\n"
-        "shared: {robot: {choice: {user/my_arm: 1}}, task: {choice: {stack: 1}}}\n"
-        "randomizers:\n  - {name: things, failures: {}}\n"
-    )
-    return config
+OWN_ARM = {"robot": "user/my_arm", "more": "assets: {folders: [arms]}\n"}
 
 
 @pytest.mark.slow
 def test_an_arm_of_a_user_stacks_with_fingers_made_for_it(tmp_path: Path) -> None:
     """From a URDF of six joints; physics confirms the stack."""
-    config = own_arm(tmp_path, my_arm())
-    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline:
-        (arm,) = pipeline.accepted_scene(0).scene.articulations
+    (tmp_path / "arms").mkdir()
+    (tmp_path / "arms/my_arm.urdf").write_text(my_arm())
+    (tmp_path / "arms/assets.yaml").write_text(
+        "robots:\n  - id: my_arm\n    file: my_arm.urdf\n"
+        "    home: {joint2: 0.3, joint3: 1.2, joint5: 1.6}\n"
+        "    tool: {kind: fingers, flange: link6, offset_m: 0.04}\n"
+    )
+    (arm,) = first_scene(user_config(tmp_path, "stack", **OWN_ARM)).articulations
     assert arm.asset == "user/my_arm"
     assert len(arm.joint_positions) == len(JOINTS) + 2
     assert arm.episode is not None
@@ -301,17 +304,9 @@ def test_a_published_panda_lifts_with_a_hand_of_its_own_files(tmp_path: Path) ->
         "    gripper: {link: palm, grasp_offset_m: 0.131, finger_joints: [open_left], "
         "stroke_m: 0.08}\n"
     )
-    config = tmp_path / "config.yaml"
-    config.write_text(
-        "extends: arm_tasks\nassets: {folders: [arms]}\n"
-        "shared: {robot: {choice: {user/my_arm: 1}}, task: {choice: {lift: 1}}}\n"
-        "randomizers:\n  - {name: things, failures: {}}\n"
-    )
-    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline:
-        (arm,) = pipeline.accepted_scene(0).scene.articulations
-    assert arm.episode is not None
-    assert arm.episode.succeeded
-    assert [span.label for span in arm.episode.held] == ["things/0"]
+    episode = episode_of(first_scene(user_config(tmp_path, "lift", **OWN_ARM)))
+    assert episode.succeeded
+    assert [span.label for span in episode.held] == [THING]
 
 
 @pytest.mark.slow
@@ -328,11 +323,10 @@ def test_a_demonstration_alone_equals_the_one_after_others() -> None:
 @pytest.mark.slow
 def test_things_are_where_physics_left_them_at_every_step() -> None:
     """The upper block of a stack is on the table at first and on the lower one at last."""
-    changes = ("shared.task=stack", *NONE_FAIL)
-    with open_pipeline(load_config("arm_tasks.yaml", overrides=(*SMALL, *changes))) as pipeline:
+    with demonstrating("stack") as pipeline:
         first, last = pipeline.sample(0), pipeline.sample(59)
-    assert _height(first, "things/0") == pytest.approx(_height(first, "things/1"), abs=2e-3)
-    assert _height(last, "things/0") - _height(last, "things/1") == pytest.approx(0.055, abs=3e-3)
+    assert _height(first, THING) == pytest.approx(_height(first, "things/1"), abs=2e-3)
+    assert _height(last, THING) - _height(last, "things/1") == pytest.approx(0.055, abs=3e-3)
 
 
 def _height(sample: Sample, body: str) -> float:

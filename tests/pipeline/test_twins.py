@@ -1,46 +1,29 @@
 """Twins: of every view the demonstration that fails by a named cause, and the one that recovers."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gen_data.assemble.config import load_config
-from gen_data.assemble.pipeline_factory import PipelineFactory, open_pipeline
+from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.errors import ConfigError
-from gen_data.core.scene import Episode, Scene
+from gen_data.core.scene import Episode
 from gen_data.core.serialization import canonical_json
 from gen_data.pipeline.pipeline import Pipeline
 from gen_data.randomizers.arm_task_table import tasks
+from tests.pipeline.test_arm_tasks import THINGS, demonstrating, episode_of
 from tests.tiers import exhaustive, slow
 
-SMALL = ("sensors.color.size_px=[96,72]", "sensors.wrist.size_px=[96,72]")
 LIMIT_S = 25.0
 ROWS = [(task, cause) for task, row in sorted(tasks().items()) for cause in row.twin_causes]
 SLOW = {("stack", "wrong_object"), ("open_drawer", "late"), ("lift", "slip"), ("hang", "miss")}
 
 
-@contextmanager
-def twins(task: str, cause: str, *changes: str) -> Iterator[Pipeline]:
-    config = "arm_pair.yaml" if tasks()[task].arms else "arm_tasks.yaml"
-    robot = "franka_panda_suction" if tasks()[task].hand == "suction" else "franka_panda"
-    given = (
-        f"shared.task={task}",
-        f"shared.robot={robot}",
-        f"randomizers.things.failures={{{cause}: 1}}",
-        f"randomizers.things.time_limit_s={LIMIT_S}",
-        "twins=true",
-    )
-    with open_pipeline(load_config(config, overrides=(*SMALL, *given, *changes))) as pipeline:
-        yield pipeline
-
-
-def episode_of(scene: Scene) -> Episode:
-    episode = scene.articulations[0].episode
-    assert episode is not None
-    return episode
+def twins(task: str, cause: str, *changes: str) -> AbstractContextManager[Pipeline]:
+    given = (f"{THINGS}.time_limit_s={LIMIT_S}", "twins=true", *changes)
+    return demonstrating(task, *given, failures=f"{{{cause}: 1}}")
 
 
 def held_s(episode: Episode, body: str) -> float:
@@ -53,9 +36,9 @@ def held_s(episode: Episode, body: str) -> float:
 def test_one_twin_fails_as_named_and_the_other_recovers(task: str, cause: str) -> None:
     """In every task and by every cause that it can have, from the same world at time 0.
 
-    What is named has happened in both, by what physics recorded: what slips was in the hand for
-    less than 1 s at first; what is missed is not taken at the first try; a blow touches before
-    anything is held; who is late waits; the other object is in the hand first.
+    Physics recorded the cause in both: an object that slips was in the hand for less than 1 s at
+    first; one that is missed is not taken at the first try; a blow touches before anything is
+    held; an arm that is late waits; the other object is in the hand first.
     """
     with twins(task, cause) as pipeline:
         scene = pipeline.accepted_scene(0).scene
@@ -133,7 +116,7 @@ REACH = ("shared.task=reach", "shared.robot=franka_panda", "twins=true")
         ("tabletop.yaml", ("twins=true",), r"twins: no arm demonstrates a task; expected .* robot"),
         ("arm_tasks.yaml", REACH, r"failures: twins of 'reach' cannot fail by slip and miss and "
          r"collision; expected one of late"),
-        ("arm_tasks.yaml", (*REACH, "randomizers.things.failures={late: 1}"),
+        ("arm_tasks.yaml", (*REACH, f"{THINGS}.failures={{late: 1}}"),
          r"failures: late needs a time limit; expected time_limit_s"),
     ],
 )  # fmt: skip

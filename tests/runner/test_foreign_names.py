@@ -5,7 +5,7 @@ Every test plants a harmless marker file, and looks for it outside.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -38,14 +38,6 @@ OUTSIDE = [
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A cache several folders below the test's own."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "a/b/c/d/cache"))
-
-
-@pytest.fixture
-def memory() -> Iterator[str]:
-    system = fsspec.filesystem("memory")
-    yield "memory://bucket/set"
-    system.store.clear()
-    system.pseudo_dirs[:] = [""]
 
 
 def edit_record(data: bytes, edit: Callable[[dict[str, Any]], None]) -> bytes:
@@ -103,40 +95,41 @@ def test_ordinary_names_stay(name: str) -> None:
 
 
 @pytest.mark.parametrize("key", ["files", "empty_folders"])
-def test_a_record_with_a_path_outside_is_no_record(tmp_path: Path, key: str) -> None:
-    make(tmp_path / "set")
-
+def test_a_record_with_a_path_outside_is_no_record(dataset: Path, key: str) -> None:
     def edit(plain: dict[str, Any]) -> None:
         plain[key] = [{**plain["files"][0], "path": UP}] if key == "files" else [UP]
 
-    data = edit_record((tmp_path / "set/shards/000000.json").read_bytes(), edit)
+    data = edit_record((dataset / "shards/000000.json").read_bytes(), edit)
     assert parse_record(data) is None
     assert parse_unchecked_record(data) is None
 
 
-def test_opening_a_url_writes_nothing_outside_its_cache(tmp_path: Path, memory: str) -> None:
-    make(tmp_path / "set")
-    plant(tmp_path / "set")
-    publish(tmp_path / "set", memory)
+def test_opening_a_url_writes_nothing_outside_its_cache(
+    tmp_path: Path, memory: str, dataset: Path
+) -> None:
+    plant(dataset)
+    publish(dataset, memory)
     with pytest.raises(StorageError, match="gen-data verify memory://bucket/set"):
         StoredObjects(memory).sample(0)
     assert escaped(tmp_path) == []
 
 
-def test_a_data_set_id_that_is_a_path_is_refused(tmp_path: Path, memory: str) -> None:
-    make(tmp_path / "set")
-    edit_manifest(tmp_path / "set", dataset_id="../../marker")
-    publish(tmp_path / "set", memory)
-    for open_set in (lambda: StoredObjects(memory), lambda: StoredSamples(tmp_path / "set")):
+def test_a_data_set_id_that_is_a_path_is_refused(
+    tmp_path: Path, memory: str, dataset: Path
+) -> None:
+    edit_manifest(dataset, dataset_id="../../marker")
+    publish(dataset, memory)
+    for open_set in (lambda: StoredObjects(memory), lambda: StoredSamples(dataset)):
         with pytest.raises(StorageError, match="dataset_id is not a sha256"):
             open_set()
     assert not list(tmp_path.rglob("marker"))
 
 
-def test_objects_whose_names_lead_out_are_refused(tmp_path: Path, memory: str) -> None:
+def test_objects_whose_names_lead_out_are_refused(
+    tmp_path: Path, memory: str, dataset: Path
+) -> None:
     """As ``verify`` reads data sets at URLs, in part and with all files."""
-    make(tmp_path / "set")
-    objects = publish(tmp_path / "set", memory)
+    objects = publish(dataset, memory)
     system = fsspec.filesystem("memory")
     system.store["/bucket/set/a/../../marker.txt"] = system.store["/bucket/set/plan.json"]
     for read in (lambda: copy_outline(objects, tmp_path / "x"), objects.tree):
@@ -145,10 +138,11 @@ def test_objects_whose_names_lead_out_are_refused(tmp_path: Path, memory: str) -
     assert escaped(tmp_path) == []
 
 
-def test_an_empty_folder_of_a_manifest_cannot_lie_outside(tmp_path: Path, memory: str) -> None:
-    make(tmp_path / "set")
-    edit_manifest(tmp_path / "set", empty_folders=["../marker"])
-    objects = publish(tmp_path / "set", memory)
+def test_an_empty_folder_of_a_manifest_cannot_lie_outside(
+    tmp_path: Path, memory: str, dataset: Path
+) -> None:
+    edit_manifest(dataset, empty_folders=["../marker"])
+    objects = publish(dataset, memory)
     with pytest.raises(StorageError, match="cannot name a file"):
         copy_outline(objects, tmp_path / "x")
     assert not (tmp_path / "marker").exists()
@@ -166,21 +160,19 @@ def test_merging_a_part_whose_record_leads_out_takes_nothing_of_it(tmp_path: Pat
 
 
 @pytest.mark.parametrize("key", ["categories", "sensors", "name"])
-def test_names_in_a_manifest_cannot_be_paths(tmp_path: Path, key: str) -> None:
-    make(tmp_path / "set")
-    info = json.loads((tmp_path / "set/manifest.json").read_bytes())["info"]
+def test_names_in_a_manifest_cannot_be_paths(dataset: Path, key: str) -> None:
+    info = json.loads((dataset / "manifest.json").read_bytes())["info"]
     if key == "sensors":
         info[key][0]["name"] = UP
     else:
         info[key] = UP if key == "name" else [UP]
-    edit_manifest(tmp_path / "set", info=info)
+    edit_manifest(dataset, info=info)
     with pytest.raises(StorageError, match="cannot name a file"):
-        StoredSamples(tmp_path / "set")
+        StoredSamples(dataset)
 
 
-def test_the_split_of_a_sample_cannot_be_a_path(tmp_path: Path) -> None:
-    make(tmp_path / "set")
-    line = json.loads((tmp_path / "set/shards/000000/labels.jsonl").read_text().splitlines()[0])
+def test_the_split_of_a_sample_cannot_be_a_path(dataset: Path) -> None:
+    line = json.loads((dataset / "shards/000000/labels.jsonl").read_text().splitlines()[0])
     with pytest.raises(ValueError, match="cannot name a file"):
         parse_labels(json.dumps({**line, "split": "../train"}))
 

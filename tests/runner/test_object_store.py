@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -34,14 +34,6 @@ def staging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-@pytest.fixture
-def memory() -> Iterator[str]:
-    system = fsspec.filesystem("memory")
-    yield "memory://bucket/set"
-    system.store.clear()
-    system.pseudo_dirs[:] = [""]
-
-
 def make_at(
     url: str, n: int = 10, progress: Callable[[RunProgress], None] | None = None, **changes: object
 ) -> Summary:
@@ -60,10 +52,11 @@ def download(url: str, folder: Path) -> Path:
     return folder
 
 
-def test_a_url_holds_the_bytes_of_a_folder_and_is_extended(tmp_path: Path, memory: str) -> None:
-    make(tmp_path / "here")
+def test_a_url_holds_the_bytes_of_a_folder_and_is_extended(
+    tmp_path: Path, memory: str, reference_digest: str
+) -> None:
     summary = make_at(memory)
-    assert tree_digest(download(memory, tmp_path / "copy")) == tree_digest(tmp_path / "here")
+    assert tree_digest(download(memory, tmp_path / "copy")) == reference_digest
     assert summary.made == 10
     again = make_at(memory)
     assert again.already_complete and again.dataset_id == summary.dataset_id
@@ -75,10 +68,8 @@ def test_a_url_holds_the_bytes_of_a_folder_and_is_extended(tmp_path: Path, memor
 
 
 def test_a_failure_of_any_put_is_repaired_by_resumption(
-    tmp_path: Path, memory: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, memory: str, monkeypatch: pytest.MonkeyPatch, reference_digest: str
 ) -> None:
-    make(tmp_path / "here")
-    wanted = tree_digest(tmp_path / "here")
     system = fsspec.filesystem("memory")
     calls = []
 
@@ -114,7 +105,7 @@ def test_a_failure_of_any_put_is_repaired_by_resumption(
         assert make_with_failure(fails_at) == fails_at
         assert not system.exists(f"{memory}/manifest.json")
         make_at(memory)
-        assert tree_digest(download(memory, tmp_path / f"copy-{fails_at}")) == wanted
+        assert tree_digest(download(memory, tmp_path / f"{fails_at}")) == reference_digest
 
 
 def test_other_bytes_of_a_shard_are_refused(memory: str) -> None:
@@ -131,8 +122,9 @@ def test_other_bytes_of_a_shard_are_refused(memory: str) -> None:
         store.commit(store.scratch_dir(), record)
 
 
-def test_damage_at_a_url_is_found_and_made_again(tmp_path: Path, memory: str) -> None:
-    make(tmp_path / "here")
+def test_damage_at_a_url_is_found_and_made_again(
+    tmp_path: Path, memory: str, reference_digest: str
+) -> None:
     make_at(memory)
     system = fsspec.filesystem("memory")
     system.pipe_file(f"{memory}/shards/000001/color/rgb/000000005.png", b"short")
@@ -140,7 +132,7 @@ def test_damage_at_a_url_is_found_and_made_again(tmp_path: Path, memory: str) ->
     [finding] = find_deviations(tmp_path / "outline")
     assert (finding.path, finding.samples) == ("shards/000001/color/rgb/000000005.png", "sample 5")
     assert not make_at(memory).already_complete
-    assert tree_digest(download(memory, tmp_path / "copy")) == tree_digest(tmp_path / "here")
+    assert tree_digest(download(memory, tmp_path / "copy")) == reference_digest
 
 
 def test_foreign_places_and_unknown_schemes_are_refused(memory: str) -> None:
@@ -182,10 +174,9 @@ def test_a_killed_run_on_s3_is_resumed(tmp_path: Path, monkeypatch: pytest.Monke
         server.stop()
 
 
-def test_samples_are_read_from_a_url(tmp_path: Path, memory: str, staging: Path) -> None:
-    make(tmp_path / "here")
+def test_samples_are_read_from_a_url(finished: Path, memory: str, staging: Path) -> None:
     make_at(memory)
-    here, there = StoredSamples(tmp_path / "here"), open_stored(memory)
+    here, there = StoredSamples(finished), open_stored(memory)
     assert there.dataset_id == here.dataset_id and there.n == 10
     assert there.kept_scene(5) == here.kept_scene(5)
     # The shard of sample 5 alone was copied.
@@ -198,7 +189,7 @@ def test_samples_are_read_from_a_url(tmp_path: Path, memory: str, staging: Path)
 
 
 def test_the_command_line_verifies_urls_and_names_them(
-    tmp_path: Path, memory: str, capsys: pytest.CaptureFixture[str]
+    memory: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     make_at(memory)
     cli.main(["verify", memory, "--full"], standalone_mode=False)
@@ -229,10 +220,9 @@ def exchange(path: str) -> None:
          "shards/000000/labels.jsonl", "manifest.json", "plan.json"))],
 )  # fmt: skip
 def test_the_command_that_made_a_data_set_repairs_changed_and_missing_objects(
-    changed: str, lost: str, tmp_path: Path, memory: str
+    changed: str, lost: str, tmp_path: Path, memory: str, reference_digest: str
 ) -> None:
     """Changed objects keep their size."""
-    make(tmp_path / "here")
     made = make_at(memory)
     exchange(f"{memory}/{changed}")
     if lost:
@@ -240,7 +230,7 @@ def test_the_command_that_made_a_data_set_repairs_changed_and_missing_objects(
     repaired = make_at(memory)
     assert not repaired.already_complete and repaired.dataset_id == made.dataset_id
     copy = download(memory, tmp_path / "copy")
-    assert tree_digest(copy) == tree_digest(tmp_path / "here")
+    assert tree_digest(copy) == reference_digest
     assert find_deviations(copy, full=True) == []
 
 

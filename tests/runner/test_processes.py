@@ -23,13 +23,6 @@ HANG_S = 120.0
 """Time limit for steps that take a second on an idle machine; only hanging ones exceed it."""
 
 
-@pytest.fixture(scope="module")
-def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
-    out = tmp_path_factory.mktemp("reference") / "out"
-    make(out)
-    return tree_digest(out)
-
-
 def impatient(silence_s: float) -> Settings:
     return Settings(limits=Limits(silence_s=silence_s), write_media=write_raw_images)
 

@@ -13,20 +13,7 @@ from gen_data.runner.run import Settings
 from gen_data.runner.verify import find_deviations
 from tests.runner.doubles import make, tree_digest, write_raw_images
 
-N, SHARD_SIZE = 6, 2
 REPAIR = Settings(repair=True, write_media=write_raw_images)
-
-
-@pytest.fixture(scope="module")
-def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("pristine") / "out"
-    make(out, N, SHARD_SIZE)
-    return out
-
-
-@pytest.fixture
-def dataset(pristine: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(pristine, tmp_path / "out"))
 
 
 def files_of(root: Path) -> list[Path]:
@@ -95,17 +82,18 @@ DAMAGES: tuple[Callable[[Path, int], None], ...] = (
 @pytest.mark.parametrize(
     "rounds", [40, pytest.param(1000, marks=pytest.mark.exhaustive)], ids=["some", "many"]
 )
-def test_every_damage_is_found_and_repaired(dataset: Path, rounds: int) -> None:
+def test_every_damage_is_found_and_repaired(
+    dataset: Path, rounds: int, reference_digest: str
+) -> None:
     """Each one in any file, sealing files included; the bytes are the same afterwards."""
     rng = random.Random(rounds)
-    before = tree_digest(dataset)
     for number in range(rounds):
         path, damage, bit = rng.choice(files_of(dataset)), rng.choice(DAMAGES), rng.getrandbits(30)
         damage(path, bit)
         case = f"round {number}: {damage.__name__} of {path.relative_to(dataset)}"
         assert find_deviations(dataset, full=True), f"{case}: not found"
-        make(dataset, N, SHARD_SIZE, settings=REPAIR)
-        assert tree_digest(dataset) == before, f"{case}: not repaired"
+        make(dataset, settings=REPAIR)
+        assert tree_digest(dataset) == reference_digest, f"{case}: not repaired"
         assert find_deviations(dataset, full=True) == [], case
         shutil.rmtree(dataset / "run/quarantine", ignore_errors=True)
 
@@ -113,10 +101,10 @@ def test_every_damage_is_found_and_repaired(dataset: Path, rounds: int) -> None:
 @pytest.mark.parametrize("name", ["000001.json", "000001/scenes.jsonl", "000001"])
 @pytest.mark.parametrize("damage", [flip, truncate, delete, add_file])
 def test_a_damaged_shard_is_made_again_without_the_option(
-    dataset: Path, damage: Callable[[Path, int], None], name: str
+    dataset: Path, damage: Callable[[Path, int], None], name: str, reference_digest: str
 ) -> None:
     """The same command hashes existing files; extra files count in unfinished data sets."""
-    before, path = tree_digest(dataset), dataset / "shards" / name
+    path = dataset / "shards" / name
     if damage is add_file:
         (dataset / "manifest.json").unlink()
         path = dataset / "shards/000001/scenes.jsonl"
@@ -124,54 +112,55 @@ def test_a_damaged_shard_is_made_again_without_the_option(
         damage(path, 100)
     else:
         shutil.rmtree(path)
-    assert make(dataset, N, SHARD_SIZE).made == SHARD_SIZE
-    assert tree_digest(dataset) == before
+    assert make(dataset).made == 4
+    assert tree_digest(dataset) == reference_digest
 
 
-def test_damage_of_an_unfinished_data_set_is_not_sealed(dataset: Path) -> None:
+def test_damage_of_an_unfinished_data_set_is_not_sealed(
+    dataset: Path, reference_digest: str
+) -> None:
     """Resumption hashes shards of earlier runs; the log names the shard."""
-    before = tree_digest(dataset)
     (dataset / "manifest.json").unlink()
     (dataset / "SHA256SUMS").unlink()
     (dataset / "shards/000002.json").unlink()
     flip(dataset / "shards/000000/color/rgb/000000001.png", 100)
-    summary = make(dataset, N, SHARD_SIZE)
-    assert summary.made == 2 * SHARD_SIZE
-    assert tree_digest(dataset) == before
+    summary = make(dataset)
+    assert summary.made == 4 + 2
+    assert tree_digest(dataset) == reference_digest
     assert "1 damaged shard(s) are replaced: 0" in (dataset / "run/log.jsonl").read_text()
     assert (dataset / "run/quarantine/0-000000/color/rgb/000000001.png").exists()
 
 
-def test_a_changed_digest_in_a_record_is_not_sealed(dataset: Path) -> None:
+def test_a_changed_digest_in_a_record_is_not_sealed(dataset: Path, reference_digest: str) -> None:
     """The record no longer matches its own checksum: nothing relies on it."""
-    before = tree_digest(dataset)
     record = dataset / "shards/000001.json"
     text = record.read_text()
     digest = json.loads(text)["files"][0]["sha256"]
     record.write_text(text.replace(digest, digest[::-1]))
     (dataset / "manifest.json").unlink()
-    assert make(dataset, N, SHARD_SIZE).made == SHARD_SIZE
-    assert tree_digest(dataset) == before
+    assert make(dataset).made == 4
+    assert tree_digest(dataset) == reference_digest
 
 
-def test_a_plan_without_sums_is_restored_from_its_copy_by_its_configuration(dataset: Path) -> None:
+def test_a_plan_without_sums_is_restored_from_its_copy_by_its_configuration(
+    dataset: Path, reference_digest: str
+) -> None:
     """Also of an unfinished data set, whose plan nothing else names."""
-    before = tree_digest(dataset)
     for name in ("manifest.json", "SHA256SUMS"):
         (dataset / name).unlink()
     flip(dataset / "plan.json", 1000)
-    make(dataset, N, SHARD_SIZE, settings=REPAIR)
-    assert tree_digest(dataset) == before
+    make(dataset, settings=REPAIR)
+    assert tree_digest(dataset) == reference_digest
     # Another configuration is refused, and nothing is changed.
     (dataset / "plan.json").write_text("{")
     damaged = tree_digest(dataset)
     with pytest.raises(StorageError, match=r"not this data set's; nothing was changed"):
-        make(dataset, N + 1, SHARD_SIZE, settings=REPAIR)
+        make(dataset, 11, settings=REPAIR)
     assert tree_digest(dataset) == damaged
 
 
 def test_other_bytes_than_the_sealed_ones_are_never_sealed(dataset: Path) -> None:
-    (dataset / "shards/000001/color/rgb/000000003.png").unlink()
+    (dataset / "shards/000001/color/rgb/000000005.png").unlink()
 
     def write_others(info: object, sample: object, shard_dir: Path) -> None:
         write_raw_images(info, sample, shard_dir)  # type: ignore[arg-type]
@@ -179,6 +168,6 @@ def test_other_bytes_than_the_sealed_ones_are_never_sealed(dataset: Path) -> Non
             path.write_bytes(b"other")
 
     with pytest.raises(DeterminismError, match=r"manifest\.json: shards/000001"):
-        make(dataset, N, SHARD_SIZE, settings=Settings(write_media=write_others))
+        make(dataset, settings=Settings(write_media=write_others))
 
     assert not (dataset / "manifest.json").exists()

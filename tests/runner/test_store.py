@@ -31,19 +31,6 @@ from tests.runner import doubles
 from tests.runner.fragile_disk import ERRNOS, FragileDisk, Killed
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A data set that tests read and do not change."""
-    out = tmp_path_factory.mktemp("finished") / "out"
-    doubles.make(out)
-    return out
-
-
-@pytest.fixture(scope="module")
-def reference_digest(finished: Path) -> str:
-    return doubles.tree_digest(finished)
-
-
 def names_in(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
@@ -102,7 +89,7 @@ def test_manifest_and_provenance_count_and_list_the_samples(finished: Path) -> N
     assert rows[0]["scene"]["instances"][0]["name"] == "thing-4"
 
 
-def test_views_keep_what_differs_and_read_back_complete(tmp_path: Path) -> None:
+def test_views_keep_what_differs_and_read_back_complete() -> None:
     """The second line of a scene repeats no field of the first line."""
     one = Scene("test", bodies=(Body("a", "mug"),))
     other = replace(one, cameras=(Camera("c", SE3(), Intrinsics.from_hfov(64, 48, 1.0)),))

@@ -2,26 +2,12 @@
 
 import random
 import re
-import shutil
 from pathlib import Path
 
 import pytest
 
 from gen_data.core.errors import VerificationError
 from gen_data.runner.verify import find_deviations, verify
-from tests.runner.doubles import make
-
-
-@pytest.fixture(scope="module")
-def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("pristine") / "out"
-    make(out)
-    return out
-
-
-@pytest.fixture
-def dataset(pristine: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(pristine, tmp_path / "out"))
 
 
 def flip_bit(path: Path, bit: int) -> None:
