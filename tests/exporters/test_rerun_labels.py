@@ -16,10 +16,10 @@ from gen_data.core.se3 import SE3
 from gen_data.exporters.label_colors import SURFACE_COLORS, UNLABELLED, id_color
 from gen_data.exporters.label_parts import BORDER_COLORS, LIFT_M
 from gen_data.exporters.rerun import Rerun
-from gen_data.preview.rerun_recording import Recorder
 from tests.exporters.drives import drive_info
 from tests.exporters.test_delivery import with_record
 from tests.exporters.test_rerun import Table, tables
+from tests.preview.recorded import recorded
 
 VISIBLE, OCCLUDED, OUTSIDE = 0, 2, 3
 MEDIA = (
@@ -258,32 +258,18 @@ def test_deliveries_are_numbers_over_time_of_sensors_that_have_such_faults(
     assert not any(path.startswith("/delivery/right") for path in read)
 
 
-class _Stream:
-    def __init__(self) -> None:
-        self.logged: dict[str, Any] = {}
-
-    def log(self, path: str, *values: Any, static: bool = False) -> None:
-        self.logged[path] = values[0]
-
-    def set_time(self, *_: object, **__: object) -> None:
-        """Times do not matter here."""
-
-    def send_blueprint(self, blueprint: object) -> None:
-        """Nor does the layout."""
-
-
 def test_recordings_of_exports_and_previews_show_the_same(
     world: Any, read: dict[str, Table], drive: list[Sample]
 ) -> None:
     """Components that the preview logs for lanes, tracks and voxels."""
     scene = replace(drive[0].scene, bodies=(), rigs=(), devices=(), tracks=())
     sample = replace(training(drive)[0], scene=scene)
-    stream = _Stream()
-    Recorder(stream, None, info_of(world)).record(sample)  # type: ignore[arg-type]
+    stream = recorded(sample, info=info_of(world))
     compared = 0
     for path in ("world/lanes", "world/tracks", "world/occupancy/voxels",
                  "world/cameras/left/image/lanes", "world/cameras/left/image/tracks"):  # fmt: skip
-        for batch in stream.logged[path].as_component_batches():
+        (shown,) = stream.at(path)
+        for batch in shown.as_component_batches():
             name = batch.component_descriptor().component
             if name in ("Points2D:class_ids", "Points2D:show_labels"):
                 continue
@@ -291,7 +277,8 @@ def test_recordings_of_exports_and_previews_show_the_same(
             assert read[f"/{path}"][name][sample.index] == values, (path, name)
             compared += 1
     assert compared > 12
-    places = stream.logged["world/mirrored/left"].positions.as_arrow_array().to_pylist()
+    (mirrored,) = stream.at("world/mirrored/left")
+    places = mirrored.positions.as_arrow_array().to_pylist()
     stored = read["/world/mirrored/left"]["Points3D:positions"][sample.index]
     assert np.abs(np.subtract(places, stored)).max() < 0.005  # half a unit of the file
 
