@@ -30,7 +30,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Found:
-    """An object in an image; None for what a format does not have.
+    """An object in an image; None for facts that a format does not have.
 
     Attributes:
         category: Name.

@@ -61,7 +61,7 @@ def values(example: Any, key: str) -> list[Any]:
 
 
 def test_lerobot_has_what_the_arm_does_each_step(world: Any, samples: Any, tmp_path: Path) -> None:
-    """At 0, 0.1, 0.2 and 0.3 s; the hand's pose is that of the step's joints."""
+    """At 0, 0.1, 0.2 and 0.3 s; the hand's pose follows from the step's joints."""
     folder = world.export(LeRobot(), drive_info(world), samples, tmp_path) / "train/toys_arm"
     rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
     info = json.loads((folder / "meta/info.json").read_text())
@@ -257,7 +257,7 @@ numpy.savez(sys.argv[3], **arrays)
 
 
 def read_by_tfds(folder: Path, split: str) -> dict[str, Any]:
-    """Arrays of all steps by key, in a process of its own: TensorFlow keeps threads."""
+    """Arrays of all steps by key, in another process: TensorFlow keeps threads."""
     found = folder.parent / "found.npz"
     command = [sys.executable, "-c", TFDS, str(folder), split, str(found)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -314,7 +314,7 @@ def test_tensorflow_datasets_reads_geometry_of_every_step(
 def test_a_task_of_two_arms_has_the_joints_and_hands_of_both(
     world: Any, samples: Any, tmp_path: Path
 ) -> None:
-    """One after the other, named by arm; the episode is that of the arm with the task."""
+    """One after the other, named by arm; the episode is of the arm with the task."""
 
     def joined(sample: Any) -> Any:
         (arm,) = sample.scene.articulations

@@ -70,7 +70,7 @@ READERS: dict[str, Callable[[Path], list[Row]]] = {
 
 @pytest.mark.parametrize("kind", READERS)
 def test_it_is_ignored_in_every_class(kind: str, world: Any, tmp_path: Path) -> None:
-    """A car in a data set of boxes and walkers, beside a crate, which is a box."""
+    """A car in a data set of boxes and walkers, near a crate, which is a box."""
     classes = {"box": ("crate",), "walker": ("pedestrian",)}
     exporter = MappedExporter(TABLE.load(kind)(), LabelMap(classes=classes, others="ignore"))
     things = (world.instance(1, "car", 9.0, 2.5, 0.0), world.instance(2, "crate", 8.0, -1.0, 0.0))

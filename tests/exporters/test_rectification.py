@@ -133,9 +133,9 @@ def test_annotations_are_those_of_the_rectified_masks(world: Any, model: str) ->
 
 @pytest.mark.parametrize("amodal", [True, False])
 def test_shares_of_objects_that_only_the_rectified_image_cuts(world: Any, amodal: bool) -> None:
-    """A field of 32 degrees cuts things that the original shows whole.
+    """A field of 32 degrees cuts objects that the original shows whole.
 
-    Without amodal masks this holds for things that nothing hides.
+    Without amodal masks this holds for objects that nothing hides.
     """
     (sample,) = bent_samples(world, "brown_conrady", 1)
     truth = sample.truth["color"]
@@ -165,7 +165,7 @@ def test_shares_of_objects_that_only_the_rectified_image_cuts(world: Any, amodal
 
 
 def test_a_panorama_needs_a_stated_field() -> None:
-    """Also a fisheye that sees sideways; what is left of it is what a pinhole at K' sees."""
+    """Also a fisheye that sees sideways; the rest of it is the view of a pinhole at K'."""
     for lens in (Lens("equirectangular"), Lens("kannala_brandt", (0.0, 0.0, 0.0, 0.0))):
         source = Intrinsics.from_hfov(160, 120, np.radians(200.0), lens)
         with pytest.raises(ConfigError, match="wider than 150 degrees; expected rectify: "):

@@ -32,7 +32,7 @@ def scannet(exported: Any) -> Path:
 
 
 def table(path: Path) -> list[list[str]]:
-    """Columns of the lines that are no comments."""
+    """Columns of all lines but comments."""
     return [row.split() for row in path.read_text().splitlines() if not row.startswith("#")]
 
 
@@ -45,7 +45,7 @@ def heights_m(depth_m: Any, pinhole: Sequence[float], pose: Any) -> Any:
 
 
 def assert_on_scene(height_m: Any, depth_m: Any, sample: Sample, depth_step_m: float) -> None:
-    """The ground is at height 0, and things reach from it to the top of their box."""
+    """The ground is at height 0, and objects reach from it to the top of their box."""
     channels = sample.capture.readings["left"].channels
     ids, seen = channels[Channel.INSTANCE], depth_m > 0.0
     margin_m = depth_step_m + 1e-6
@@ -85,7 +85,7 @@ def test_tum_points_lie_on_the_scene_and_are_listed(tum: Path, samples: Sequence
             exact = sample.capture.readings["left"].channels[Channel.Z_DEPTH]
             assert (depth_m[np.isfinite(exact) & (exact < 13.0)] > 0.0).all()
             assert_on_scene(heights_m(depth_m, pinhole, pose), depth_m, sample, 0.0006)
-    # In the order of their times; the photographs are those of the data set.
+    # In the order of their times; the photographs are as in the data set.
     for number, split in enumerate(("train", "val")):
         folder = tum / split / f"{number:06d}"
         for kind in ("rgb", "depth"):
@@ -152,7 +152,7 @@ def test_scannet_labels_are_nyu40_of_instances_in_scans_listed_by_split(
                 expected[ids == thing.instance_id] = NYU40[thing.category]
             assert np.array_equal(labels, expected)
             assert np.array_equal(instances, np.where(expected > 0, ids, 0))
-    # Every frame has a photograph like that of the data set, in JPEG.
+    # Every frame has the photograph of the data set, in JPEG.
     assert (scannet / "scannetv2_train.txt").read_text() == "scene0000_00\n"
     assert (scannet / "scannetv2_val.txt").read_text() == "scene0001_00\n"
     for number in range(2):
