@@ -57,12 +57,12 @@ def project_cv(D: Array, *, fisheye: bool = False, matrix: Array = K) -> Array:
 
 
 def assert_projects(found: Intrinsics, expected_px: Array) -> None:
-    """OpenCV's pixel coordinates plus a half are those of this project, to 1e-6 px."""
+    """Pixel coordinates are OpenCV's plus a half, to 1e-6 px."""
     np.testing.assert_allclose(found.project(POINTS_M), expected_px + 0.5, atol=1e-6)
 
 
 def cv_text(ending: str, folder: Path, values: Mapping[str, Any]) -> str:
-    """What OpenCV's own writer makes of values."""
+    """Values in a file, by OpenCV's own writer."""
     path = folder / f"written{ending}"
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     for key, value in values.items():
@@ -456,7 +456,7 @@ def test_a_kalibr_chain_places_cameras_from_the_imu(tmp_path: Path) -> None:
 
 
 def test_a_pair_of_opencv_is_placed_by_r_and_t(tmp_path: Path) -> None:
-    """``stereoCalibrate``: points of camera 2 are R times those of 1, plus T; here in mm."""
+    """``stereoCalibrate``: points of camera 2 are R times points of 1, plus T; here in mm."""
     R, _ = cv2.Rodrigues(np.array([0.01, -0.02, 0.03]))
     T = np.array([[-60.0], [0.5], [1.5]])
     more = {"M1": K, "D1": D5, "M2": K, "D2": D5, "R": R, "T": T}
