@@ -1,7 +1,7 @@
 """Annotators on images drawn by hand, where every number can be counted on paper."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -263,75 +263,10 @@ def keypoint(image_px: tuple[float, float], visibility: Any) -> KeypointTruth:
     return KeypointTruth("tip", (0.0, 0.0, 1.0), image_px, visibility)
 
 
-def _moved(silhouette: Silhouette) -> Silhouette:
-    return replace(silhouette, x_px=silhouette.x_px - 1)
-
-
-def _holed(silhouette: Silhouette) -> Silhouette:
-    mask = silhouette.mask.copy()
-    mask[3, 4] = False
-    return replace(silhouette, mask=mask)
-
-
-def _padded(silhouette: Silhouette) -> Silhouette:
-    return replace(silhouette, mask=np.pad(silhouette.mask, ((0, 1), (0, 0))))
-
-
-def _emptied(silhouette: Silhouette) -> Silhouette:
-    return replace(silhouette, mask=np.zeros((0, 0), bool))
-
-
-@pytest.mark.parametrize(
-    ("spoil", "fault"),
-    [
-        (_moved, "leaves the box"),
-        (_holed, "visible that are not in its silhouette"),
-        (_padded, "not stored tight"),
-        (_emptied, "leaves the box None"),
-    ],
-)
-def test_a_silhouette_that_contradicts_the_image_stops_the_sample(spoil: Any, fault: str) -> None:
-    scene, reading = scene_and_reading()
-    bad = replace(reading, silhouettes={**reading.silhouettes, 2: spoil(reading.silhouettes[2])})
-
-    with pytest.raises(SampleError, match=f"sensor 'color', instance 2 'arm': .*{fault}"):
-        annotate_objects(scene, bad, annotators("boxes2d"), Thresholds())
-
-
-def test_a_silhouette_that_was_not_rendered_stops_the_sample() -> None:
-    scene, reading = scene_and_reading()
-
-    with pytest.raises(SampleError, match="instance 2 'arm': the renderer returned no silhouette"):
-        annotate_objects(scene, replace(reading, silhouettes={}), annotators(), Thresholds())
-
-
-@pytest.mark.parametrize(
-    ("changes", "fault"),
-    [
-        ({"T_world_instance": SE3((0.0, math.nan, 0.0))}, "not rigid"),
-        ({"T_world_instance": SE3((0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0))}, "not rigid"),
-        ({"box_max_m": (-0.2, 0.2, 1.0)}, "has the size"),
-        ({"box_max_m": (math.inf, 0.2, 1.0)}, "has the size"),
-        ({"box_min_m": (0.0, 0.0, 0.0), "box_max_m": (0.0, 0.0, 0.0)}, "has the size"),
-        ({"parts": ("base",)}, "shows part 3; it has 1 parts"),
-        ({"category_id": 2}, "another category than 2"),
-    ],
-)
-def test_an_instance_that_cannot_be_stops_the_sample(changes: dict[str, Any], fault: str) -> None:
-    scene, reading = scene_and_reading()
-    scene = replace(scene, instances=(replace(ARM, **changes), MUG))
-
-    with pytest.raises(SampleError, match=f"instance 2 'arm': .*{fault}"):
-        annotate_objects(scene, reading, annotators(), Thresholds())
-
-
-def test_an_annotated_instance_without_a_category_stops_the_sample() -> None:
-    """Category 0 means none: no format could write it."""
-    scene, reading = scene_and_reading()
-    scene = replace(scene, instances=(replace(ARM, category_id=0),))
-
-    with pytest.raises(SampleError, match="annotated and its category 'robot' has no id"):
-        annotate_objects(scene, reading, annotators("poses"), Thresholds())
+WHOLE = np.ones((8, 10), bool)
+"""The silhouette of the arm; a hole in the next is at a visible pixel."""
+HOLED = WHOLE.copy()
+HOLED[3, 4] = False
 
 
 class _Liar:
@@ -341,37 +276,86 @@ class _Liar:
         self.changes = changes
 
     def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
-        return replace(truth, **self.changes)
+        return replace(
+            truth, **{k: v(truth) if callable(v) else v for k, v in self.changes.items()}
+        )
+
+
+Spoiled = tuple[Scene, SensorReading, list[Any]]
+Spoil = Callable[[Scene, SensorReading], Spoiled]
+
+
+def silhouette(**changes: Any) -> Spoil:
+    """The arm has another silhouette."""
+
+    def spoil(scene: Scene, reading: SensorReading) -> Spoiled:
+        bad = replace(reading.silhouettes[2], **changes)
+        return scene, replace(reading, silhouettes={**reading.silhouettes, 2: bad}), []
+
+    return spoil
+
+
+def arm(**changes: Any) -> Spoil:
+    """The arm is another one in the scene."""
+    return lambda scene, reading: (
+        replace(scene, instances=(replace(ARM, **changes), MUG)), reading, []
+    )  # fmt: skip
+
+
+def told(**changes: Any) -> Spoil:
+    """Another annotator changes the truth; callables receive the truth before it."""
+    return lambda scene, reading: (scene, reading, [_Liar(**changes)])
+
+
+def turned(truth: ObjectTruth) -> Any:
+    """A mask of the right shape and count."""
+    assert truth.mask is not None
+    return replace(truth.mask, pixels=truth.mask.pixels[::-1, ::-1])
 
 
 @pytest.mark.parametrize(
-    ("changes", "fault"),
+    ("spoil", "fault"),
     [
-        ({"visible_px": 35}, "does not hold its 35 visible pixels"),
-        ({"box": BoxPx(0, 2, 7, 10)}, "not the tight box"),
-        ({"box": BoxPx(0, 2, 5, 10)}, "does not hold"),
-        ({"box": BoxPx(0, 2, 6, 13)}, "leaves the image"),
-        ({"visible_fraction": 1.01}, "visible_fraction is 1.01"),
-        ({"occlusion": -0.1}, "occlusion is -0.1"),
-        ({"truncation": math.nan}, "truncation is nan"),
-        ({"T_camera_object": SE3((0.0, 0.0, 1.0), (1.0, 0.1, 0.0, 0.0))}, "not a rigid pose"),
-        ({"keypoints": (keypoint((20.0, 3.0), 2),)}, "'tip' at .* px is not in the image"),
-        ({"keypoints": (keypoint((2.0, 3.0), 0),)}, "'tip' is not in the image and has a place"),
-        ({"keypoints": (keypoint((2.0, math.nan), 1),)}, "'tip' is nowhere"),
+        (silhouette(x_px=-5), "leaves the box"),
+        (silhouette(mask=HOLED), "visible that are not in its silhouette"),
+        (silhouette(mask=np.pad(WHOLE, ((0, 1), (0, 0)))), "not stored tight"),
+        (silhouette(mask=np.zeros((0, 0), bool)), "leaves the box None"),
+        (lambda scene, reading: (scene, replace(reading, silhouettes={}), []),
+         "the renderer returned no silhouette"),
+        (arm(T_world_instance=SE3((0.0, math.nan, 0.0))), "not rigid"),
+        (arm(T_world_instance=SE3((0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0))), "not rigid"),
+        (arm(box_max_m=(-0.2, 0.2, 1.0)), "has the size"),
+        (arm(box_max_m=(math.inf, 0.2, 1.0)), "has the size"),
+        (arm(box_min_m=(0.0, 0.0, 0.0), box_max_m=(0.0, 0.0, 0.0)), "has the size"),
+        (arm(parts=("base",)), "shows part 3; it has 1 parts"),
+        (arm(category_id=2), "another category than 2"),
+        (told(visible_px=35), "does not hold its 35 visible pixels"),
+        (told(box=BoxPx(0, 2, 7, 10)), "not the tight box"),
+        (told(box=BoxPx(0, 2, 5, 10)), "does not hold"),
+        (told(box=BoxPx(0, 2, 6, 13)), "leaves the image"),
+        (told(visible_fraction=1.01), "visible_fraction is 1.01"),
+        (told(occlusion=-0.1), "occlusion is -0.1"),
+        (told(truncation=math.nan), "truncation is nan"),
+        (told(T_camera_object=SE3((0.0, 0.0, 1.0), (1.0, 0.1, 0.0, 0.0))), "not a rigid pose"),
+        (told(keypoints=(keypoint((20.0, 3.0), 2),)), "'tip' at .* px is not in the image"),
+        (told(keypoints=(keypoint((2.0, 3.0), 0),)), "'tip' is not in the image and has a place"),
+        (told(keypoints=(keypoint((2.0, math.nan), 1),)), "'tip' is nowhere"),
+        (told(mask=turned), "mask is not its visible pixels"),
     ],
-)
-def test_labels_are_checked_against_the_image_always(changes: dict[str, Any], fault: str) -> None:
+)  # fmt: skip
+def test_contradictions_between_scene_image_and_labels_stop_the_sample(
+    spoil: Spoil, fault: str
+) -> None:
     """Third-party annotators are held to the same contract."""
+    scene, reading, liars = spoil(*scene_and_reading())
+
     with pytest.raises(SampleError, match=f"instance 2 'arm': .*{fault}"):
-        annotate_objects(*scene_and_reading(), [*annotators(), _Liar(**changes)], Thresholds())
+        annotate_objects(scene, reading, [*annotators(), *liars], Thresholds())
 
 
-def test_a_mask_of_other_pixels_stops_the_sample() -> None:
-    """Also one of the right shape and count."""
-    scene, reading = scene_and_reading()
-    arm = annotate_objects(scene, reading, annotators(), Thresholds()).objects[0]
-    assert arm.mask is not None
-    turned = replace(arm.mask, pixels=arm.mask.pixels[::-1, ::-1])
+def test_an_annotated_instance_without_a_category_stops_the_sample() -> None:
+    """Category 0 means none: no format could write it."""
+    scene, reading, _ = arm(category_id=0)(*scene_and_reading())
 
-    with pytest.raises(SampleError, match="mask is not its visible pixels"):
-        annotate_objects(scene, reading, [*annotators(), _Liar(mask=turned)], Thresholds())
+    with pytest.raises(SampleError, match="annotated and its category 'robot' has no id"):
+        annotate_objects(scene, reading, annotators("poses"), Thresholds())

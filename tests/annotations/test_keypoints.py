@@ -50,12 +50,6 @@ def seen(
     return truth.keypoints
 
 
-def visibility(x_m: float, y_m: float, z_m: float, **changes: Any) -> int:
-    """Of one point of radius 5 cm."""
-    (point,) = seen(Keypoint("tip", (x_m, y_m, z_m), 0.05), **changes)
-    return point.visibility
-
-
 def test_a_point_on_the_surface_is_visible_at_its_projection() -> None:
     """(0.3, -0.2, 2) m with a focal length of 10 px: 1.5 px right of, 1 px above (10, 6)."""
     (point,) = seen(Keypoint("tip", (0.3, -0.2, 2.0)))
@@ -73,48 +67,39 @@ def test_positions_follow_the_instance() -> None:
     assert point.image_px == pytest.approx((9.0, 6.5))
 
 
-@pytest.mark.parametrize(("depth_m", "expected"), [(1.9, 2), (2.04, 2), (2.06, 1), (3.0, 1)])
-def test_a_point_below_its_surface_is_visible_to_its_radius(depth_m: float, expected: int) -> None:
-    """On the optical axis; behind more than 5 cm of the object it is hidden by the object."""
-    assert visibility(0.0, 0.0, depth_m) == expected
-
-
-def test_depth_is_measured_across_the_surface() -> None:
-    """On a slant: the panel's normal is the optical axis, however the ray comes."""
-    assert visibility(-0.9 * 1.024, 0.7 * 1.024, 2.0 * 1.024) == 2
-    assert visibility(-0.9 * 1.026, 0.7 * 1.026, 2.0 * 1.026) == 1
-
-
-def test_a_point_below_a_surface_that_is_seen_obliquely_is_as_deep_as_across_it() -> None:
-    """At 60 degrees 9 cm along the ray are 4.5 cm across; grazing rays go three radii deep."""
-    half, root = 0.5, 0.75**0.5
-    assert visibility(0.0, 0.0, 2.09, normal=(root, 0.0, -half)) == 2
-    assert visibility(0.0, 0.0, 2.11, normal=(root, 0.0, -half)) == 1
-    assert visibility(0.0, 0.0, 2.14, normal=(1.0, 0.0, 0.0)) == 2
-    assert visibility(0.0, 0.0, 2.16, normal=(1.0, 0.0, 0.0)) == 1
-
-
-def test_a_point_behind_something_else_is_hidden() -> None:
-    """And so is one at the border of it, whose neighbour shows the panel."""
-    assert (visibility(0.7, 0.0, 2.0), visibility(0.41, 0.0, 2.0)) == (1, 1)
-    assert visibility(0.39, 0.0, 2.0) == 2
-
-
-def test_a_point_in_front_of_what_covers_the_panel_counts_as_silhouette() -> None:
-    """The screen is 3 m away: the ray misses the panel by one pixel, or by two."""
-    assert visibility(0.41, 0.0, 2.0, screen_m=3.0) == 2
-    assert visibility(0.61, 0.0, 2.0, screen_m=3.0) == 1
+SLANT = np.array([-0.9, 0.7, 2.0])
+OBLIQUE = {"normal": (0.75**0.5, 0.0, -0.5)}
+GRAZING = {"normal": (1.0, 0.0, 0.0)}
+FAR_SCREEN = {"screen_m": 3.0}
 
 
 @pytest.mark.parametrize(
-    ("place_m", "expected"),
-    [((-1.01, 0.0, 2.0), 2), ((-1.21, 0.0, 2.0), 1), ((0.0, -0.81, 2.0), 2), ((0.0, -1.1, 2.0), 1)],
-)
-def test_a_ray_that_misses_the_silhouette_by_a_pixel_is_visible(
-    place_m: tuple[float, float, float], expected: int
+    ("place_m", "changes", "expected"),
+    [
+        # On the optical axis: deeper than 5 cm in the object it is hidden by the object.
+        ((0, 0, 1.9), {}, 2), ((0, 0, 2.04), {}, 2), ((0, 0, 2.06), {}, 1), ((0, 0, 3.0), {}, 1),
+        # On a slant: the panel's normal is the optical axis, however the ray comes.
+        (1.024 * SLANT, {}, 2), (1.026 * SLANT, {}, 1),
+        # At 60 degrees 9 cm along the ray are 4.5 cm across; grazing rays go three radii deep.
+        ((0, 0, 2.09), OBLIQUE, 2), ((0, 0, 2.11), OBLIQUE, 1),
+        ((0, 0, 2.14), GRAZING, 2), ((0, 0, 2.16), GRAZING, 1),
+        # Behind the screen; also at its border, where a neighbour shows the panel.
+        ((0.7, 0, 2.0), {}, 1), ((0.41, 0, 2.0), {}, 1), ((0.39, 0, 2.0), {}, 2),
+        # The screen is 3 m away: the ray misses the panel by one pixel, or by two.
+        ((0.41, 0, 2.0), FAR_SCREEN, 2), ((0.61, 0, 2.0), FAR_SCREEN, 1),
+        # One pixel off the panel's left and upper edge, and two.
+        ((-1.01, 0, 2.0), {}, 2), ((-1.21, 0, 2.0), {}, 1),
+        ((0, -0.81, 2.0), {}, 2), ((0, -1.1, 2.0), {}, 1),
+        # The very corner of the image belongs to it.
+        ((-2.0, -1.2, 2.0), {}, 1),
+    ],
+)  # fmt: skip
+def test_a_point_is_visible_near_the_surface_and_hidden_behind_and_off_the_object(
+    place_m: Any, changes: dict[str, Any], expected: int
 ) -> None:
-    """One pixel off the panel's left and upper edge, and two."""
-    assert visibility(*place_m) == expected
+    """A point of radius 5 cm."""
+    (point,) = seen(Keypoint("tip", tuple(map(float, place_m)), 0.05), **changes)
+    assert point.visibility == expected
 
 
 @pytest.mark.parametrize(
@@ -128,11 +113,6 @@ def test_a_point_outside_the_image_or_behind_is_at_zero(
 
     assert (point.image_px, point.visibility) == ((0.0, 0.0), 0)
     assert point.position_m == place_m
-
-
-def test_the_first_pixel_belongs_to_the_image() -> None:
-    """(-2, -1.2, 2) m is its very corner."""
-    assert visibility(-2.0, -1.2, 2.0) == 1
 
 
 def test_points_keep_the_instances_order() -> None:

@@ -321,7 +321,7 @@ def test_cielab_is_that_of_opencv() -> None:
 
 def test_most_limits_each_kind() -> None:
     """Spread evenly over all possible ones."""
-    row = view(*(thing(k, f"thing {k}", 20 * k, 20 * k + 10) for k in range(7)))
+    row = view(*(thing(k, f"object {k}", 20 * k, 20 * k + 10) for k in range(7)))
     every = list(Language(most=100, kinds=("expression",))._utterances(row))
 
     assert list(Language(most=3, kinds=("expression",))._utterances(row)) == [

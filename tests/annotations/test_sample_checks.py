@@ -68,7 +68,7 @@ def make_sample() -> Sample:
         pose = SE3.about_z(0.3 * k, (0.1 * k, 0.05 * k, 0.0))
         category = k % 3
         instance = Instance(
-            number, f"thing-{k}", CATEGORIES[category], category + 1, "asset", parts=("lid",),
+            number, f"object-{k}", CATEGORIES[category], category + 1, "asset", parts=("lid",),
             T_world_instance=pose, box_min_m=(-0.1, -0.1, -0.1), box_max_m=(0.1, 0.1, 0.1),
         )  # fmt: skip
         x, y = 20 + 100 * (k % 5), 20 + 90 * (k // 5)
@@ -118,7 +118,7 @@ def make_sample() -> Sample:
         index=0, scene_index=0, view_index=0, split="train", scene=scene,
         capture=Capture(
             {"color": SensorReading("color", camera, images)},
-            {"top": PointCloud("top", lidar, points)},
+            {"top": PointCloud("top", lidar, points, origins=np.zeros(63, ORIGIN))},
             {"imu": Measurements("imu", device, rows)},
         ),
         truth={"color": ImageTruth(camera, tuple(objects))},
@@ -149,39 +149,49 @@ def change_instance(**fields: Any) -> Mutation:
     return change_object(instance=lambda item: replace(item.instance, **fields))
 
 
-def change_pixel(channel: Channel, value: float) -> Mutation:
+def change_value(find: Callable[[Sample], Any], value: float, axes: int = 1) -> Mutation:
+    """Change a random element of an array of the sample; later axes are changed as a whole."""
+
     def mutate(rng: random.Random) -> Sample:
         sample = make_sample()
-        image = sample.capture.readings["color"].channels[channel]
-        image[rng.randrange(HEIGHT_PX), rng.randrange(WIDTH_PX)] = value
+        array = find(sample)
+        array[tuple(rng.randrange(size) for size in array.shape[:axes])] = value
         return sample
 
     return mutate
 
 
-def change_origins(field: str, value: float) -> Mutation:
-    def mutate(rng: random.Random) -> Sample:
-        sample = make_sample()
-        cloud = sample.capture.clouds["top"]
-        origins = np.zeros(len(cloud.points), ORIGIN)
-        origins[field][rng.randrange(50)] = value
-        clouds = {"top": replace(cloud, origins=origins)}
-        return replace(sample, capture=replace(sample.capture, clouds=clouds))
-
-    return mutate
+def change_pixel(channel: Channel, value: float) -> Mutation:
+    return change_value(lambda s: s.capture.readings["color"].channels[channel], value, 2)
 
 
 def change_points(field: str, value: float) -> Mutation:
+    return change_value(lambda s: s.capture.clouds["top"].points[field], value)
+
+
+def change_origins(field: str, value: float) -> Mutation:
+    return change_value(lambda s: s.capture.clouds["top"].origins[field], value)  # type: ignore[index]
+
+
+def change_images(change: Callable[[Any], Any]) -> Mutation:
     def mutate(rng: random.Random) -> Sample:
         sample = make_sample()
-        sample.capture.clouds["top"].points[field][rng.randrange(50)] = value
+        change(sample.capture.readings["color"].channels)
         return sample
 
     return mutate
 
 
-def change_sample(change: Callable[[Sample], Sample]) -> Mutation:
-    return lambda rng: change(make_sample())
+def change_part(name: str, **fields: Any) -> Mutation:
+    """Change fields of the scene or the frame; callables receive it."""
+
+    def mutate(rng: random.Random) -> Sample:
+        sample = make_sample()
+        part = getattr(sample, name)
+        values = {n: v(part) if callable(v) else v for n, v in fields.items()}
+        return replace(sample, **{name: replace(part, **values)})
+
+    return mutate
 
 
 def shifted(box: BoxPx, by_px: int) -> BoxPx:
@@ -197,53 +207,13 @@ def moved_box(box: OrientedBox, by_m: float) -> OrientedBox:
     return replace(box, T_frame_box=moved(box.T_frame_box, by_m))
 
 
-def swap_ids(sample: Sample) -> Sample:
-    image = sample.truth["color"]
-    return replace(sample, truth={"color": replace(image, objects=image.objects[::-1])})
+def reverse_objects(truth: Any) -> Any:
+    return {"color": replace(truth["color"], objects=truth["color"].objects[::-1])}
 
 
-def lose_instance(sample: Sample) -> Sample:
-    return replace(sample, scene=replace(sample.scene, instances=sample.scene.instances[:-1]))
-
-
-def scale_pose(sample: Sample) -> Sample:
-    bent = replace(sample.scene.bodies[3], T_world_body=SE3((0, 0, 0), (1.001, 0.0, 0.0, 0.0)))
-    bodies = (*sample.scene.bodies[:3], bent, *sample.scene.bodies[4:])
-    return replace(sample, scene=replace(sample.scene, bodies=bodies))
-
-
-def lose_channel(sample: Sample) -> Sample:
-    reading = sample.capture.readings["color"]
-    images = {c: a for c, a in reading.channels.items() if c is not Channel.RGB}
-    return replace(
-        sample,
-        capture=replace(sample.capture, readings={"color": replace(reading, channels=images)}),
-    )
-
-
-def crop_channel(sample: Sample) -> Sample:
-    reading = sample.capture.readings["color"]
-    images = {**reading.channels, Channel.RGB: reading.channels[Channel.RGB][1:]}
-    return replace(
-        sample,
-        capture=replace(sample.capture, readings={"color": replace(reading, channels=images)}),
-    )
-
-
-def break_rows(sample: Sample) -> Sample:
-    sample.capture.tables["imu"].rows["acceleration_m_s2"][2, 1] = INF
-    return sample
-
-
-def add_frame_box(sample: Sample) -> Sample:
-    assert sample.frame is not None
-    boxes = {"ego": {999: OrientedBox(SE3(), (1.0, 1.0, 1.0))}}
-    return replace(sample, frame=replace(sample.frame, boxes3d=boxes))
-
-
-def bend_frame(sample: Sample) -> Sample:
-    assert sample.frame is not None
-    return replace(sample, frame=replace(sample.frame, T_world_ego=SE3((NAN, 0.0, 0.0))))
+def scale_body(scene: Scene) -> tuple[Body, ...]:
+    bent = replace(scene.bodies[3], T_world_body=SE3((0, 0, 0), (1.001, 0.0, 0.0, 0.0)))
+    return (*scene.bodies[:3], bent, *scene.bodies[4:])
 
 
 def flipped(mask: MaskPx) -> MaskPx:
@@ -291,16 +261,20 @@ MUTATIONS: dict[str, Mutation] = {
     "category too large": change_instance(category_id=4),
     "category of another": change_instance(category="book", category_id=3),
     "id unknown": change_instance(instance_id=77),
-    "name of another": change_instance(name="thing"),
+    "name of another": change_instance(name="other"),
     "not annotated": change_instance(annotated=False),
-    "order of objects": change_sample(swap_ids),
-    "instance lost": change_sample(lose_instance),
-    "body scaled": change_sample(scale_pose),
-    "channel lost": change_sample(lose_channel),
-    "channel cropped": change_sample(crop_channel),
-    "rows infinite": change_sample(break_rows),
-    "frame box of nothing": change_sample(add_frame_box),
-    "ego pose NaN": change_sample(bend_frame),
+    "order of objects": lambda rng: replace(s := make_sample(), truth=reverse_objects(s.truth)),
+    "instance lost": change_part("scene", instances=lambda scene: scene.instances[:-1]),
+    "body scaled": change_part("scene", bodies=scale_body),
+    "channel lost": change_images(lambda images: images.pop(Channel.RGB)),
+    "channel cropped": change_images(lambda i: i.update({Channel.RGB: i[Channel.RGB][1:]})),
+    "rows infinite": change_value(
+        lambda s: s.capture.tables["imu"].rows["acceleration_m_s2"], INF, 2
+    ),
+    "frame box of nothing": change_part(
+        "frame", boxes3d={"ego": {999: OrientedBox(SE3(), (1.0, 1.0, 1.0))}}
+    ),
+    "ego pose NaN": change_part("frame", T_world_ego=SE3((NAN, 0.0, 0.0))),
     "depth NaN": change_pixel(Channel.Z_DEPTH, NAN),
     "depth negative": change_pixel(Channel.Z_DEPTH, -1.0),
     "normal NaN": change_pixel(Channel.NORMALS, NAN),

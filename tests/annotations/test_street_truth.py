@@ -87,12 +87,14 @@ def seen(scene: Scene) -> SensorReading:
     return SensorReading("front", scene.cameras[0], channels)
 
 
+def annotated(annotator: FreeSpace | Lanes, scene: Scene) -> ImageTruth:
+    """Labels of the image of a scene."""
+    return annotator.annotate_image(scene, library(), seen(scene), ImageTruth(scene.cameras[0], ()))
+
+
 def test_borders_are_where_the_ground_is_seen_under_them() -> None:
     """Image points, put back on the ground, lie 4 m, 0 m or -4 m from the street's middle."""
-    scene = street()
-    truth = Lanes(far_m=60.0).annotate_image(
-        scene, library(), seen(scene), ImageTruth(scene.cameras[0], ())
-    )
+    truth = annotated(Lanes(far_m=60.0), street())
     assert truth.borders is not None
     sides = {("edge", -4.0), ("road", 0.0), ("edge", 4.0)}
     assert len(truth.borders) == 3
@@ -111,10 +113,7 @@ def test_borders_are_where_the_ground_is_seen_under_them() -> None:
 def test_points_behind_a_car_are_listed_and_hidden() -> None:
     """The car ahead hides the area behind its box, and nothing before it or at its sides."""
     scene = street()
-    reading = seen(scene)
-    truth = Lanes(step_px=1.0).annotate_image(
-        scene, library(), reading, ImageTruth(scene.cameras[0], ())
-    )
+    reading, truth = seen(scene), annotated(Lanes(step_px=1.0), scene)
     assert truth.borders is not None
     hidden = 0
     for border in truth.borders:
@@ -130,10 +129,7 @@ def test_points_behind_a_car_are_listed_and_hidden() -> None:
 def test_free_space_is_the_carriageway_that_nothing_stands_on() -> None:
     """Pixels whose rays meet the ground between y = -4 and 4 before anything else."""
     scene = street()
-    reading = seen(scene)
-    truth = FreeSpace(far_m=30.0).annotate_image(
-        scene, library(), reading, ImageTruth(scene.cameras[0], ())
-    )
+    reading, truth = seen(scene), annotated(FreeSpace(far_m=30.0), scene)
     assert truth.free_space is not None
     found = np.zeros((200, 320), bool)
     mask = truth.free_space
@@ -155,9 +151,7 @@ def test_free_space_is_the_carriageway_that_nothing_stands_on() -> None:
 def test_nothing_is_free_where_there_is_no_street() -> None:
     """An empty mask, not None: it was looked for."""
     scene = replace(street(), bodies=(street().body("ego"),))
-    truth = FreeSpace().annotate_image(
-        scene, library(), seen(scene), ImageTruth(scene.cameras[0], ())
-    )
+    truth = annotated(FreeSpace(), scene)
 
     assert truth.free_space is not None
     assert truth.free_space.pixels.size == 0

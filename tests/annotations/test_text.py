@@ -1,6 +1,5 @@
 """Written text: ink that rays of Embree find is in the quads, and hidden where they miss it."""
 
-import json
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -24,13 +23,14 @@ from gen_data.core.motion import Trajectory
 from gen_data.core.sample import ImageTruth, TextTruth, WordTruth
 from gen_data.core.scene import Body, Camera, Scene
 from gen_data.core.se3 import SE3, look_at
-from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.core.serialization import canonical_json
 from gen_data.core.shutter import Shutter
 from gen_data.core.writing import Writing, recording
 from tests.assets.test_draped_meshes import HILL, PLACE
 from tests.embree import RayCaster, placed
 from tests.libraries import library
 from tests.renderers.fake_library import FakeLibrary, box_mesh
+from tests.survival import assert_survives
 
 SHEET_PX = (2048, 1024)
 PRINT = Material(texture="texture/print")
@@ -421,13 +421,13 @@ def test_a_plate_has_its_text_once_though_its_edges_show_the_texture_too() -> No
 
 def test_annotations_survive_being_stored() -> None:
     truth = ImageTruth(camera(0.5), (), texts=look("flat", camera(0.5)).truth)
-    assert from_plain(ImageTruth, json.loads(canonical_json(truth))).texts == truth.texts
+    assert_survives(truth)
     assert "texts" not in canonical_json(ImageTruth(camera(0.5), ()))
 
 
 @pytest.mark.slow
 def test_families_of_textures_declare_whether_they_write() -> None:
-    """Those that record text for one of four seeds do; the others of these for one of twenty."""
+    """Families that record text for one of four seeds do; the others of them for one of twenty."""
     for name, family in known_families().items():
         if isinstance(family, TextureFamily):
             declared = bool(family.declares.get("writing"))

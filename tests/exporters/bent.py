@@ -7,8 +7,7 @@ import cv2
 import numpy as np
 
 from gen_data.annotations.annotate import Thresholds
-from gen_data.core.boxes import tight_box
-from gen_data.core.capture import Capture, Channel, SensorReading, Silhouette
+from gen_data.core.capture import Capture, SensorReading
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.core.scene import Camera, Scene
@@ -62,26 +61,7 @@ def bent_reading(scene: Scene, camera: Camera) -> SensorReading:
     """Labels of a bent camera, whose silhouettes end with the image."""
     k = camera.intrinsics
     u, v = np.meshgrid(np.arange(k.width_px), np.arange(k.height_px))
-    rays = opencv_rays(k, u, v)
-    depth = conftest._ground_depth(rays, camera)
-    ids, categories = np.zeros(depth.shape, np.uint16), np.zeros(depth.shape, np.uint16)
-    silhouettes = {}
-    for thing in scene.instances:
-        hit = conftest._hit(rays, thing, camera)
-        box = tight_box(np.isfinite(hit))
-        mask = np.zeros((0, 0), bool) if box is None else np.isfinite(hit)[box.window()]
-        x, y = (0, 0) if box is None else (box.x_min, box.y_min)
-        silhouettes[thing.instance_id] = Silhouette(thing.instance_id, x, y, mask)
-        nearer = hit < depth
-        depth = np.where(nearer, hit, depth)
-        ids[nearer], categories[nearer] = thing.instance_id, thing.category_id
-    shade = np.where(np.isfinite(depth), 255.0 / (1.0 + 0.1 * depth), 0.0)
-    rgb = np.stack([shade, 20.0 * ids, 60.0 * categories], axis=-1).astype(np.uint8)
-    channels = {Channel.RGB: rgb, Channel.Z_DEPTH: depth.astype(np.float32),
-                Channel.RANGE: (depth * np.linalg.norm(rays, axis=-1)).astype(np.float32),
-                Channel.NORMALS: conftest._normals(depth[..., None] * rays), Channel.INSTANCE: ids,
-                Channel.CATEGORY: categories, Channel.PART: np.zeros_like(ids)}  # fmt: skip
-    return SensorReading(camera.name, camera, channels, silhouettes)
+    return conftest.read_rays(scene, camera, opencv_rays(k, u, v))
 
 
 def bent_samples(world: Any, model: str, count: int = 2) -> list[Any]:
@@ -92,12 +72,6 @@ def bent_samples(world: Any, model: str, count: int = 2) -> list[Any]:
         readings = {"color": bent_reading(sample.scene, camera)}
         scene = replace(sample.scene, cameras=(camera,))
         truth = conftest.annotated(scene, readings, Thresholds())
-        bent.append(
-            replace(
-                sample,
-                scene=scene,
-                capture=Capture(readings, sample.capture.clouds, sample.capture.tables),
-                truth=truth,
-            )
-        )
+        capture = Capture(readings, sample.capture.clouds, sample.capture.tables)
+        bent.append(replace(sample, scene=scene, capture=capture, truth=truth))
     return bent

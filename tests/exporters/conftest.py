@@ -1,7 +1,6 @@
 """A small data set: boxes and ellipsoids on a ground plane, ray-cast with numpy.
 
-Independent of every renderer of the project, so that what exporters write can be held against
-geometry.
+Independent of every renderer of the project: geometry, against which exports are held.
 """
 
 import math
@@ -53,6 +52,7 @@ from gen_data.exporters.image_files import write_media
 from gen_data.runner.shard import drop_pixels
 from gen_data.sensors import TABLE as SENSORS
 from gen_data.sensors.navigation.imu import Imu
+from tests.exporters.datasets import imaging, in_scene
 from tests.exporters.drives import drive_info
 from tests.wheels import NO_RERUN
 
@@ -109,6 +109,18 @@ def level_camera(name: str = "color", size_px: tuple[int, int] = (160, 120)) -> 
     return Camera(name, look_at((0.0, 0.0, 1.6), (10.0, 0.0, 1.6)), intrinsics)
 
 
+def cast(scene: Scene, rays: Array, camera: Camera) -> tuple[Array, Array, Array, dict[int, Array]]:
+    """Depth, instance and category along rays; by instance, the depth without all others."""
+    depth = _ground_depth(rays, camera)
+    ids, categories = (np.zeros(depth.shape, np.uint16) for _ in range(2))
+    hits = {thing.instance_id: _hit(rays, thing, camera) for thing in scene.instances}
+    for thing in scene.instances:
+        nearer = hits[thing.instance_id] < depth
+        depth = np.where(nearer, hits[thing.instance_id], depth)
+        ids[nearer], categories[nearer] = thing.instance_id, thing.category_id
+    return depth, ids, categories, hits
+
+
 def ray_cast(scene: Scene, camera: Camera) -> SensorReading:
     """Every channel, and silhouettes on a canvas three images wide and high."""
     k = camera.intrinsics
@@ -116,18 +128,19 @@ def ray_cast(scene: Scene, camera: Camera) -> SensorReading:
     u = (np.arange(-w, 2 * w) + 0.5 - k.cx_px) / k.fx_px
     v = (np.arange(-h, 2 * h) + 0.5 - k.cy_px) / k.fy_px
     rays = np.stack([*np.meshgrid(u, v), np.ones((3 * h, 3 * w))], axis=-1)
-    inside = (slice(h, 2 * h), slice(w, 2 * w))
-    depth = _ground_depth(rays[inside], camera)
-    ids = np.zeros((h, w), np.uint16)
-    categories = np.zeros((h, w), np.uint16)
-    silhouettes = {}
-    for thing in scene.instances:
-        hit = _hit(rays, thing, camera)
-        silhouettes[thing.instance_id] = _silhouette(thing.instance_id, np.isfinite(hit), w, h)
-        nearer = hit[inside] < depth
-        depth = np.where(nearer, hit[inside], depth)
-        ids[nearer] = thing.instance_id
-        categories[nearer] = thing.category_id
+    return read_rays(scene, camera, rays, (w, h))
+
+
+def read_rays(
+    scene: Scene, camera: Camera, rays: Array, margin_px: tuple[int, int] = (0, 0)
+) -> SensorReading:
+    """Images of rays, and silhouettes that reach into a margin of the rays around the images."""
+    x, y = margin_px
+    height, width = rays.shape[:2]
+    inside = (slice(y, height - y), slice(x, width - x))
+    *images, hits = cast(scene, rays, camera)
+    depth, ids, categories = (image[inside] for image in images)
+    silhouettes = {k: _silhouette(k, np.isfinite(hit), x, y) for k, hit in hits.items()}
     shade = np.where(np.isfinite(depth), 255.0 / (1.0 + 0.1 * depth), 0.0)
     rgb = np.stack([shade, 20.0 * ids, 60.0 * categories], axis=-1).astype(np.uint8)
     channels: dict[Channel, NDArray[Any]] = {
@@ -180,12 +193,12 @@ def _silhouette(number: int, canvas: NDArray[np.bool_], w: int, h: int) -> Silho
     box = tight_box(canvas)
     if box is None:
         return Silhouette(number, 0, 0, np.zeros((0, 0), dtype=bool))
-    mask = canvas[box.y_min : box.y_max, box.x_min : box.x_max]
+    mask = canvas[box.window()]
     return Silhouette(number, box.x_min - w, box.y_min - h, mask)
 
 
 def street(index: int) -> tuple[Instance, ...]:
-    """Things of frame ``index``; every fourth frame is empty."""
+    """Objects of frame ``index``; every fourth frame is empty."""
     if index % 4 == 3:
         return ()
     turn = 0.7 * index
@@ -227,7 +240,7 @@ def imu_rows(index: int) -> NDArray[Any]:
 def annotated(
     scene: Scene, readings: Mapping[str, SensorReading], thresholds: Thresholds
 ) -> dict[str, ImageTruth]:
-    """Every annotation of every object, and what is said about the images, without relations."""
+    """Every annotation of every object, and texts about the images, without relations."""
     annotators = [annotations.TABLE.load(name)() for name in annotations.TABLE]
     language = Language(min_visible_px=thresholds.min_visible_px, min_visible_fraction=0.1)
     truth = {}
@@ -321,15 +334,13 @@ def make_pairs() -> tuple[DatasetInfo, list[Sample]]:
         v, u = np.mgrid[:120, :160].astype(np.float32)
         flow = np.stack([0.25 * u - 10.0, 0.125 * v], axis=-1)
         flow[:10] = np.nan
-        channels = {
-            **left.channels,
+        images = {
             Channel.FLOW_FORWARD: flow,
             Channel.FLOW_OCCLUDED_FORWARD: (v % 3 == 0).astype(np.uint8),
             Channel.DISPARITY: disparity,
             Channel.DISPARITY_VISIBLE: np.where(np.arange(160) % 2, 0.0, disparity),
         }
-        readings = {**sample.capture.readings, "left": replace(left, channels=channels)}
-        samples.append(replace(sample, capture=replace(sample.capture, readings=readings)))
+        samples.append(imaging(sample, "left", images))
     media = {
         "left": (Channel.RGB, Channel.DISPARITY, Channel.DISPARITY_VISIBLE, Channel.FLOW_FORWARD,
                  Channel.FLOW_OCCLUDED_FORWARD),
@@ -351,12 +362,8 @@ def make_reach() -> list[Sample]:
     for sample in make_drive():
         positions = track.positions(sample.scene.time_s)
         carried = Trajectory("crate/4", STEP_S, (SE3(), SE3((0.0, 0.0, 0.1))))
-        scene = replace(
-            sample.scene,
-            articulations=(replace(arm, joint_positions=positions),),
-            tracks=(carried,),
-        )
-        samples.append(replace(sample, scene=scene))
+        moved = replace(arm, joint_positions=positions)
+        samples.append(in_scene(sample, articulations=(moved,), tracks=(carried,)))
     return samples
 
 
@@ -373,7 +380,7 @@ def frame_of(scene: Scene) -> EgoTruth:
 
 
 def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:
-    """A coarse sweep over the things and the ground."""
+    """A coarse sweep over the objects and the ground."""
     elevation, azimuth = np.meshgrid(np.radians(np.arange(2, -24, -1)), np.radians(range(180)))
     level = np.cos(elevation)
     rays = np.stack(
@@ -381,13 +388,7 @@ def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:
     ).reshape(-1, 3)
     rays[:, 1] = np.where(np.arange(len(rays)) % 2, rays[:, 1], -rays[:, 1])
     eye = Camera("eye", lidar.T_world_lidar, level_camera().intrinsics)
-    nearest = _ground_depth(rays, eye)
-    ids, categories = np.zeros(len(rays), int), np.zeros(len(rays), int)
-    for thing in scene.instances:
-        hit = _hit(rays, thing, eye)
-        nearer = hit < nearest
-        nearest = np.where(nearer, hit, nearest)
-        ids[nearer], categories[nearer] = thing.instance_id, thing.category_id
+    nearest, ids, categories, _ = cast(scene, rays, eye)
     near = nearest < 100.0
     points = np.zeros(int(near.sum()), POINT)
     points["position_m"] = rays[near] * nearest[near, None]
@@ -440,7 +441,7 @@ def with_bodies(samples: Sequence[Sample]) -> list[Sample]:
             Body(t.name, f"{t.asset}/{t.category}", t.T_world_instance, instance_id=t.instance_id)
             for t in sample.scene.instances
         )
-        embodied.append(replace(sample, scene=replace(sample.scene, bodies=bodies)))
+        embodied.append(in_scene(sample, bodies=bodies))
     return embodied
 
 

@@ -5,6 +5,7 @@ import csv
 import gc
 import io
 import json
+import re
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
@@ -30,19 +31,21 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Found:
-    """An object in an image; None for what a format does not have.
+    """An object in an image; None for facts that a format does not have.
 
     Attributes:
         category: Name.
         box: Left, top, right and bottom [px].
         mask: Visible pixels, [height, width].
         number: Instance id.
+        ignored: Whether scores leave it out.
     """
 
     category: str
     box: tuple[float, ...] | None = None
     mask: Mask | None = None
     number: int | None = None
+    ignored: bool = False
 
 
 Images = Iterator[tuple[str, str, list[Found]]]
@@ -73,6 +76,7 @@ def opened(path: Path) -> COCO:
 def in_coco(folder: Path) -> Images:
     for path in folder.glob("annotations/instances_*.json"):
         coco = opened(path)
+        assert len(coco.anns) == len(coco.dataset["annotations"])
         for number, image in coco.imgs.items():
             rows = [
                 Found(
@@ -80,6 +84,7 @@ def in_coco(folder: Path) -> Images:
                     sides(row["bbox"]),
                     coco.annToMask(row).astype(bool),
                     row["instance_id"],
+                    bool(row["iscrowd"]),
                 )
                 for row in coco.imgToAnns[number]
             ]
@@ -211,16 +216,17 @@ def in_voc(folder: Path) -> Images:
     (root,) = folder.glob("VOCdevkit/*")
     names = [row.split(":")[0] for row in (root / "labelmap.txt").read_text().splitlines()[1:]]
     for split in ("train", "val"):
-        for stem in (root / f"ImageSets/Main/{split}.txt").read_text().split():
+        path = root / f"ImageSets/Main/{split}.txt"
+        for stem in path.read_text().split() if path.exists() else ():
             assert (root / f"JPEGImages/{stem}.jpg").is_file()
             classes, objects = (
                 pixels(root / f"Segmentation{kind}/{stem}.png", "P") for kind in ("Class", "Object")
             )
             rows = [
-                Found(row["name"], row["box"], objects == k)
+                Found(row["name"], row["box"], objects == k, ignored=row["difficult"] == "1")
                 for k, row in enumerate(voc_objects(root / f"Annotations/{stem}.xml"), 1)
             ]
-            for row in rows:
+            for row in (r for r in rows if not r.ignored):
                 assert {names[k] for k in np.unique(classes[row.mask])} == {row.category}
             assert ((classes > 0) == (objects > 0)).all()
             yield split, stem, rows
@@ -274,9 +280,12 @@ def in_parquet(folder: Path) -> Images:
             listed, size = row["objects"], [row["height"], row["width"]]
             masks = [coco_mask.decode({"size": size, "counts": c}) for c in listed["rle"]]
             assert listed["area"] == [mask.sum() for mask in masks]
+            assert len(set(listed["id"])) == len(masks)
             rows = [
-                Found(names[k], sides(box), mask.astype(bool))
-                for k, box, mask in zip(listed["category"], listed["bbox"], masks, strict=True)
+                Found(names[k], sides(box), mask.astype(bool), ignored=crowd)
+                for k, box, mask, crowd in zip(
+                    listed["category"], listed["bbox"], masks, listed["iscrowd"], strict=True
+                )
             ]
             yield path.name.split("-")[0], Path(row["image"]["path"]).stem, rows
 
@@ -300,20 +309,24 @@ def records(path: Path) -> list[Features]:
 
 
 def in_records(folder: Path) -> Images:
-    """Sides as shares of the image, labels from 1 as text too, masks as PNG files."""
+    """Sides as shares of the image, labels of the map as text too, masks as PNG files."""
+    known = re.findall(r'name: "(.*)"', (folder / "label_map.pbtxt").read_text())
     for path in folder.glob("*.tfrecord"):
         for record in records(path):
             values = {key: found for key, (_, found) in record.items()}
             (height,), (width,) = values["image/height"], values["image/width"]
             names = [name.decode() for name in values["image/object/class/text"]]
+            assert names == [known[k - 1] for k in values["image/object/class/label"]]
             boxes = np.array(
                 [values[f"image/object/bbox/{k}"] for k in ("xmin", "ymin", "xmax", "ymax")]
             )
             boxes = np.round(boxes.T * [width, height, width, height], 3)
             masks = [np.asarray(Image.open(io.BytesIO(m))) for m in values["image/object/mask"]]
             rows = [
-                Found(name, tuple(box), mask == 1)
-                for name, box, mask in zip(names, boxes.tolist(), masks, strict=True)
+                Found(name, tuple(box), mask == 1, ignored=bool(crowd))
+                for name, box, mask, crowd in zip(
+                    names, boxes.tolist(), masks, values["image/object/is_crowd"], strict=True
+                )
             ]
             name = values["image/filename"][0].decode()
             yield path.name.split("-")[0], Path(name).stem, rows
@@ -336,14 +349,17 @@ def in_tar(folder: Path) -> Images:
     """Labels of each camera in the JSON member of a sample."""
     for split in folder.iterdir():
         for sample in tar_samples(split):
+            listed = sample["json"]["cameras"]["color"]["annotations"]
+            assert len({row["id"] for row in listed}) == len(listed)
             rows = [
                 Found(
                     row["category"],
                     sides(row["bbox"]),
                     coco_mask.decode(row["segmentation"]).astype(bool),
                     row["instance_id"],
+                    bool(row["iscrowd"]),
                 )
-                for row in sample["json"]["cameras"]["color"]["annotations"]
+                for row in listed
             ]
             yield split.name, f"{sample['__key__']}_color", rows
 

@@ -1,35 +1,30 @@
 """Argoverse 2: tables, scans, boxes and maps, read without the devkit."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gen_data.core.errors import ConfigError
 from gen_data.core.scene_time import RIG_AXES
 from gen_data.core.se3 import SE3
 from gen_data.exporters.argoverse2 import Argoverse2
 from gen_data.exporters.argoverse_map import argoverse_map, mark_type, without_holes
 from gen_data.exporters.road_map import Area, Paint, road_map
-from tests.exporters.drives import drive_info
-from tests.exporters.test_nuscenes_expansions import on_streets, streets
+from tests.exporters.datasets import made_of
+from tests.exporters.test_nuscenes_expansions import streets, town
 from tests.libraries import library
 
 LOG = "train/street-000000"
 
 
-def town(world: Any) -> tuple[Any, Any]:
-    return drive_info(world), on_streets(world.drive())
+dataset = made_of(Argoverse2(), town, library)
 
 
 @pytest.fixture(scope="module")
-def log(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("argoverse2")
-    made: Path = world.export(Argoverse2(), *town(world), folder, assets=library())
-    return made / LOG
+def log(dataset: Path) -> Path:
+    return dataset / LOG
 
 
 def table(path: Path) -> list[dict[str, Any]]:
@@ -137,10 +132,3 @@ def test_marks_have_the_types_of_the_format() -> None:
     assert mark_type(Paint("solid", is_double=True, is_yellow=True)) == "DOUBLE_SOLID_YELLOW"
     assert mark_type(Paint("dashed", is_double=True)) == "DOUBLE_DASH_WHITE"
     assert mark_type(Paint("dashed", is_yellow=True)) == "DASHED_YELLOW"
-
-
-def test_data_sets_without_a_scanner_are_refused(world: Any) -> None:
-    with pytest.raises(ConfigError, match=r"argoverse2.*there is no lidar; add a sensor"):
-        Argoverse2().check(world.info(2))
-    info = replace(drive_info(world), n=2)
-    Argoverse2().check(info)

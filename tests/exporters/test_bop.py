@@ -26,6 +26,8 @@ from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.exporters.bop import Bop
 from gen_data.exporters.rigid_models import Piece, build_model
 from tests.embree import RayCaster
+from tests.exporters.conftest import Props
+from tests.exporters.datasets import in_scene, made_of
 
 DELTA_MM = 5.0
 
@@ -54,7 +56,7 @@ class Renderer:
         rotation = np.array(gt["cam_R_m2c"]).reshape(3, 3)
         u, v = np.meshgrid(np.arange(-width, 2 * width) + 0.5, np.arange(-height, 2 * height) + 0.5)
         rays = np.stack([(u - k[0, 2]) / k[0, 0], (v - k[1, 2]) / k[1, 1], np.ones_like(u)], -1)
-        # Rays have a unit of depth per unit of length, so that distances are depths.
+        # Rays have a unit of depth per unit of length: distances are depths.
         eye = -np.array(gt["cam_t_m2c"]) @ rotation
         depth = self._scenes[gt["obj_id"]].cast(eye, rays @ rotation).distance
         return np.where(np.isfinite(depth), depth, 0.0)
@@ -172,14 +174,15 @@ def problems(root: Path) -> list[str]:
     return [*wrong_models(root), *wrong_images(root), *wrong_targets(root)]
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def with_tests(world: Any) -> tuple[Any, Any]:
     """Seven frames, the second and the fifth for tests."""
-    samples = [
+    return world.info(7), [
         replace(s, split="test" if s.index in (1, 4) else s.split)
         for s in world.with_bodies(world.samples)
     ]
-    return world.export(Bop(), world.info(7), samples, tmp_path_factory.mktemp("bop"))
+
+
+dataset = made_of(Bop(), with_tests)
 
 
 @pytest.mark.slow
@@ -236,7 +239,7 @@ def test_equal_geometries_share_a_model(dataset: Path) -> None:
 def test_each_scale_is_an_object_of_its_own(world: Any, tmp_path: Path) -> None:
     first, *others = world.with_bodies(world.samples[:3])
     bodies = tuple(replace(b, scale=0.5) if "car" in b.name else b for b in first.scene.bodies)
-    changed = replace(first, scene=replace(first.scene, bodies=bodies))
+    changed = in_scene(first, bodies=bodies)
     root = world.export(Bop(), world.info(3), [changed, *others], tmp_path)
     sizes = {
         (v["asset"], v["scale"]): read(root / "models/models_info.json")[k]["size_x"]
@@ -251,7 +254,7 @@ def test_robots_and_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> 
     (sample,) = world.with_bodies(world.samples[:1])
     truth = sample.truth["color"]
     robot = Articulation("arm", "robot", 2, IDENTITY, ())
-    changed = world.ignoring(replace(sample, scene=replace(sample.scene, articulations=(robot,))))
+    changed = world.ignoring(in_scene(sample, articulations=(robot,)))
     root = world.export(Bop(), world.info(1), [changed], tmp_path)
     assets = [v["asset"] for v in read(root / "objects.json").values()]
     assert assets == [
@@ -292,9 +295,7 @@ def test_views_of_a_scene_share_a_folder(world: Any, tmp_path: Path) -> None:
 class OneCube:
     """A library with a cube and the given symmetries."""
 
-    def __init__(self, world: Any, symmetries: tuple[Symmetry, ...]) -> None:
-        from tests.exporters.conftest import Props
-
+    def __init__(self, symmetries: tuple[Symmetry, ...]) -> None:
         self._props, self._symmetries = Props(), symmetries
 
     def get(self, asset_id: str) -> Any:
@@ -305,17 +306,15 @@ class OneCube:
         return self._props.mesh(asset_id)
 
 
-def info_of(world: Any, *symmetries: Symmetry) -> Any:
+def info_of(*symmetries: Symmetry) -> Any:
     piece = Piece("primitive/box/crate", 2.0, IDENTITY)
-    return build_model((piece,), OneCube(world, symmetries)).info  # type: ignore[arg-type]
+    return build_model((piece,), OneCube(symmetries)).info  # type: ignore[arg-type]
 
 
-def test_symmetries_are_a_whole_group_in_their_place_and_end(world: Any) -> None:
+def test_symmetries_are_a_whole_group_in_their_place_and_end() -> None:
     """Quarter turns about Z and half turns about X: eight poses, of which one is the identity."""
     middle = (0.0, 0.0, 0.45)
-    info = info_of(
-        world, Symmetry((0.0, 0.0, 1.0), 4), Symmetry((1.0, 0.0, 0.0), 2, offset_m=middle)
-    )
+    info = info_of(Symmetry((0.0, 0.0, 1.0), 4), Symmetry((1.0, 0.0, 0.0), 2, offset_m=middle))
     assert len(info["symmetries_discrete"]) == 7
     for row in info["symmetries_discrete"]:
         pose = np.array(row).reshape(4, 4)
@@ -323,20 +322,20 @@ def test_symmetries_are_a_whole_group_in_their_place_and_end(world: Any) -> None
         # Both axes go through the centre, which is the model's origin.
         np.testing.assert_allclose(pose[:3, 3], 0.0, atol=1e-3)
     # In millimetres from the centre of the scaled model.
-    info = info_of(world, Symmetry((0.0, 0.0, 1.0), 0, (0.1, 0.0, 0.0)))
+    info = info_of(Symmetry((0.0, 0.0, 1.0), 0, (0.1, 0.0, 0.0)))
     (row,) = info["symmetries_continuous"]
     assert row["axis"] == [0.0, 0.0, 1.0]
     assert row["offset"] == pytest.approx([200.0, 0.0, -900.0], abs=1e-3)
     assert "symmetries_discrete" not in info
     # Parallel axes generate ever more poses.
     with pytest.raises(AssetError, match="symmetries generate more than 120 poses"):
-        info_of(world, Symmetry((0.0, 0.0, 1.0), 2), Symmetry((0.0, 0.0, 1.0), 2, (1.0, 0.0, 0.0)))
+        info_of(Symmetry((0.0, 0.0, 1.0), 2), Symmetry((0.0, 0.0, 1.0), 2, (1.0, 0.0, 0.0)))
 
 
-def test_several_bodies_are_one_model(world: Any) -> None:
+def test_several_bodies_are_one_model() -> None:
     """Each at its pose in the frame of the instance."""
     pieces = (Piece("primitive/box/crate", 1.0, IDENTITY),
               Piece("primitive/box/crate", 1.0, SE3((3.0, 0.0, 0.0))))  # fmt: skip
-    model = build_model(pieces, OneCube(world, ()))  # type: ignore[arg-type]
+    model = build_model(pieces, OneCube(()))  # type: ignore[arg-type]
     assert model.info["size_x"] == pytest.approx(4000.0)
     assert model.center_m == pytest.approx((1.5, 0.0, 0.45))

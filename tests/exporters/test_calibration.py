@@ -17,6 +17,7 @@ from gen_data.core.se3 import SE3, turned
 from gen_data.exporters.calibration import CalibrationFiles, calibration_texts
 from gen_data.exporters.calibration_texts import colmap_camera
 from gen_data.sensors.calibration.read_calibration import read_calibration
+from tests.exporters.datasets import in_scene
 
 BENT = Lens("brown_conrady", (-0.21, 0.09, 0.0007, -0.0004, 0.0, 0.0, 0.0, 0.0))
 STRONG = Lens("brown_conrady", (-0.21, 0.09, 0.0007, -0.0004, -0.012, 0.01, 0.002, 0.0005))
@@ -81,7 +82,7 @@ def test_opencv_and_ros_project_to_the_same_places(folder: Path, name: str) -> N
 
 @pytest.mark.parametrize("name", sorted(LENSES))
 def test_files_are_read_back_as_the_same_camera(folder: Path, tmp_path: Path, name: str) -> None:
-    """COLMAP's pixel centres are those of this project: nothing is subtracted."""
+    """COLMAP has the pixel centres of this project: nothing is subtracted."""
     lens = SCENE.camera(name).intrinsics
     for file in (f"opencv/{name}.yml", f"ros/{name}.yaml"):
         assert_is(read_calibration(folder / file).camera(""), lens)
@@ -115,7 +116,7 @@ def test_a_chain_of_kalibr_leads_from_camera_to_camera_without_other_lenses(fold
 
 @pytest.mark.parametrize("name", ["bent", "fisheye", "pinhole"])
 def test_a_chain_is_read_back_as_the_same_cameras_and_places(folder: Path, name: str) -> None:
-    """Places on the rig are those of the scene, relative to the IMU's."""
+    """Places on the rig are as in the scene, relative to the IMU's."""
     calibration = read_calibration(folder / "kalibr/rig.yaml")
     key = f"cam{sorted(LENSES).index(name)}"
     assert_is(calibration.camera(key), SCENE.camera(name).intrinsics)
@@ -160,7 +161,7 @@ def test_every_distinct_calibration_has_a_number(world: Any, tmp_path: Path) -> 
             replace(c, intrinsics=replace(c.intrinsics, fx_px=500.0 + k % 2))
             for c in sample.scene.cameras
         )
-        samples.append(replace(sample, scene=replace(sample.scene, cameras=cameras)))
+        samples.append(in_scene(sample, cameras=cameras))
     folder = world.export(CalibrationFiles(), world.info(len(samples)), samples, tmp_path)
     rows = (folder / "samples.csv").read_text().splitlines()
     assert rows[0] == "index,split,calibration"

@@ -55,7 +55,7 @@ def test_numbers_and_plurals(world: Any, category: str, count: int, words: str) 
     ],
 )  # fmt: skip
 def test_weather(weather: Weather, words: str) -> None:
-    """A haze of several kilometres is no fog."""
+    """A haze of several kilometres is not called fog."""
     assert describe_weather(weather) == words
 
 

@@ -15,25 +15,23 @@ from PIL import Image, ImageDraw
 from gen_data.core.capture import Channel
 from gen_data.exporters.cityscapes import Cityscapes
 from gen_data.exporters.cityscapes_classes import city_classes
+from tests.exporters.datasets import in_scene, made_of, with_sensor
+from tests.exporters.label_readers import pixels
 from tests.exporters.test_labels import truth_of
 
 CLASS_OF = {"car": 26, "crate": 5, "pedestrian": 24}
 
 
-@pytest.fixture(scope="module")
-def samples(world: Any) -> list[Any]:
+def with_a_tree(world: Any) -> tuple[Any, list[Any]]:
     """The street, and a frame with a tree that is not annotated."""
     tree = replace(
         world.instance(9, "crate", 12.0, 1.0, 0.2), category="tree", category_id=0, annotated=False
     )
     wood = world.sample(7, (world.instance(1, "crate", 8.0, 1.6, 0.4), tree), [world.camera()])
-    return [*world.samples, wood]
+    return world.info(8, depth_scale_m=1 / 256), [*world.samples, wood]
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, samples: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    info = world.info(8, depth_scale_m=1 / 256)
-    return world.export(Cityscapes(), info, samples, tmp_path_factory.mktemp("cityscapes"))
+dataset = made_of(Cityscapes(), with_a_tree)
 
 
 def files_of(root: Path, index: int) -> dict[str, Path]:
@@ -46,11 +44,6 @@ def files_of(root: Path, index: int) -> dict[str, Path]:
         "camera": root / f"camera/train/{stem}camera.json",
         "image": root / f"leftImg8bit/train/{stem}leftImg8bit.png",
     }
-
-
-def pixels(path: Path) -> Any:
-    with Image.open(path) as image:
-        return np.asarray(image).astype(np.int64)
 
 
 def redrawn(path: Path) -> Any:
@@ -94,10 +87,10 @@ def problems(root: Path, samples: Any) -> list[str]:
     return found
 
 
-def test_label_images_and_polygons_agree_with_the_samples(dataset: Path, samples: Any) -> None:
+def test_label_images_and_polygons_agree_with_the_samples(dataset: Path, world: Any) -> None:
     """Counted classes have numbers; crates are dynamic and have none."""
-    assert problems(dataset, samples) == []
-    # A tree without annotation is vegetation; what is above the horizon is sky.
+    assert problems(dataset, with_a_tree(world)[1]) == []
+    # A tree without annotation is vegetation; above the horizon is sky.
     labels = pixels(files_of(dataset, 7)["labelIds"])
     codes = pixels(files_of(dataset, 7)["instanceIds"])
     instances = pixels(dataset.parent / "shards/000002/color/instance/000000007.png")
@@ -125,10 +118,7 @@ def test_calibration_is_that_of_the_camera(world: Any, tmp_path: Path) -> None:
 def test_a_pair_has_disparities_and_a_baseline(world: Any, tmp_path: Path) -> None:
     """(value - 1) / 256 pixels; times depth they are focal length times baseline."""
     info, pairs = world.pairs()
-    channels = {"left": (*info.media["left"], Channel.INSTANCE), "right": (Channel.RGB,)}
-    info = replace(
-        info, sensors=tuple(replace(s, channels=channels.get(s.name, ())) for s in info.sensors)
-    )
+    info = with_sensor(info, "left", channels=(*info.media["left"], Channel.INSTANCE))
     folder = world.export(Cityscapes(camera="left", right="right"), info, pairs, tmp_path)
     stem = "train/street/street_000000_000001"
     facts = json.loads((folder / f"camera/{stem}_camera.json").read_text())
@@ -154,9 +144,8 @@ def test_riders_vans_and_egos_have_classes_and_ignored_none(world: Any, tmp_path
     sofa = replace(bicycle, category="sofa", annotated=False)
     assert classes.of_instance(sofa).name == "static"
     sample = world.drive()[0]
-    scene = sample.scene
-    bodies = tuple(replace(b, instance_id=1) if b.name == "ego" else b for b in scene.bodies)
-    own = replace(sample, scene=replace(scene, bodies=bodies))
+    bodies = tuple(replace(b, instance_id=1) if b.name == "ego" else b for b in sample.scene.bodies)
+    own = in_scene(sample, bodies=bodies)
     info = world.info(1, ("left", "right"), ("top",))
     folder = world.export(Cityscapes(camera="left"), info, [own], tmp_path)
     codes = pixels(files_of(folder, 0)["instanceIds"])

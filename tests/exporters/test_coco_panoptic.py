@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
-from PIL import Image
 
 from gen_data.exporters.coco_panoptic import CocoPanoptic
-from tests.exporters.label_readers import segments_of
+from tests.exporters.datasets import made_of
+from tests.exporters.label_readers import pixels, segments_of
 
 
 def scenery(world: Any, category: str = "tree") -> Any:
-    """A tree and a hood, neither annotated, behind and beside an annotated crate."""
+    """A tree and a hood, neither annotated, behind and next to an annotated crate."""
     tree = replace(world.instance(5, "crate", 12.0, 1.0, 0.2), annotated=False)
     hood = replace(world.instance(6, "car", 9.0, -3.0, 0.0), annotated=False)
     things = (
@@ -26,12 +25,12 @@ def scenery(world: Any, category: str = "tree") -> Any:
     return world.sample(7, things, [world.camera()])
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def with_scenery(world: Any) -> tuple[Any, list[Any]]:
     """The street and a frame with scenery; the depth of 16-bit images reaches the sky."""
-    folder = tmp_path_factory.mktemp("panoptic")
-    info = world.info(8, depth_scale_m=1 / 256)
-    return world.export(CocoPanoptic(), info, [*world.samples, scenery(world)], folder)
+    return world.info(8, depth_scale_m=1 / 256), [*world.samples, scenery(world)]
+
+
+dataset = made_of(CocoPanoptic(), with_scenery)
 
 
 def read(folder: Path, split: str = "train") -> Any:
@@ -86,12 +85,11 @@ def panoptic_quality(folder: Path, predicted: Callable[[NDArray[Any]], NDArray[A
 
 def test_it_scores_one_with_scenery_as_stuff_and_unannotated_cars_as_void(dataset: Path) -> None:
     """The ground truth as prediction has PQ 1; shifted by some pixels it has not."""
-    folder = dataset
-    assert problems(folder) == []
-    assert panoptic_quality(folder, lambda ids: ids) == 1.0
-    assert panoptic_quality(folder, lambda ids: np.roll(ids, 4, axis=1)) < 0.9
-    # Names of stuff that occur follow the things; a hood is neither thing nor background.
-    truth = read(folder)
+    assert problems(dataset) == []
+    assert panoptic_quality(dataset, lambda ids: ids) == 1.0
+    assert panoptic_quality(dataset, lambda ids: np.roll(ids, 4, axis=1)) < 0.9
+    # Names of stuff that occurs come last; a hood is neither instance nor background.
+    truth = read(dataset)
     names = {c["id"]: (c["name"], c["isthing"]) for c in truth["categories"]}
     assert list(names.values()) == [
         ("car", 1), ("crate", 1), ("pedestrian", 1), ("sky", 0), ("tree", 0),
@@ -101,15 +99,13 @@ def test_it_scores_one_with_scenery_as_stuff_and_unannotated_cars_as_void(datase
     (annotation,) = (a for a in truth["annotations"] if a["file_name"] == "000000007_color.png")
     shown = [names[s["category_id"]][0] for s in annotation["segments_info"]]
     assert shown == ["crate", "pedestrian", "sky", "tree"]
-    ids = segments_of(folder / "annotations/panoptic_train/000000007_color.png")
-    with Image.open(dataset.parent / "shards/000002/color/instance/000000007.png") as image:
-        instances = np.asarray(image)
+    ids = segments_of(dataset / "annotations/panoptic_train/000000007_color.png")
+    instances = pixels(dataset.parent / "shards/000002/color/instance/000000007.png")
     assert (instances == 6).any()
     assert (ids[instances == 6] == 0).all()
     (tree,) = (s for s in annotation["segments_info"] if s["category_id"] == numbers["tree"])
     np.testing.assert_array_equal(ids == tree["id"], instances == 5)
     # The level camera has it in its upper half, behind everything.
-    truth = read(dataset)
     for annotation in truth["annotations"]:
         (sky,) = (s for s in annotation["segments_info"] if s["category_id"] == numbers["sky"])
         _, top, _, height = sky["bbox"]
@@ -136,7 +132,7 @@ def test_stuff_has_the_same_ids_in_a_training_and_a_test_set_with_other_scenery(
 
 
 def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:
-    """Evaluation leaves out what is predicted there."""
+    """Evaluation leaves out predictions there."""
     sample = world.samples[0]
     first, *others = sample.truth["color"].objects
     folder = world.export(CocoPanoptic(), world.info(1), [world.ignoring(sample)], tmp_path)

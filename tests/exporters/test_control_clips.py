@@ -13,7 +13,7 @@ import pytest
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.exporters.control_clips import ControlClips, inverse_depth
-from tests.exporters.datasets import street_in
+from tests.exporters.datasets import made_of
 
 FIXED = ControlClips(near_m=5.0, far_m=60.0)
 
@@ -69,7 +69,7 @@ def wrong_frame(split: Path, row: Any, clip: Any, channels: Any) -> Iterator[str
         yield "edges"
 
 
-dataset = street_in(ControlClips())
+dataset = made_of(ControlClips())
 
 
 def test_signals_follow_from_the_images(dataset: Path, world: Any) -> None:

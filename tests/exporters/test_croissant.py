@@ -6,17 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from gen_data.core.interfaces import DatasetInfo, Publication
 from gen_data.exporters.croissant import Croissant
+from tests.exporters.datasets import made_of
 from tests.exporters.label_readers import csv_rows
-
-
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("croissant")
-    return world.export(Croissant(), published(world), world.samples, folder)
 
 
 def published(world: Any, licence: str = "") -> DatasetInfo:
@@ -28,6 +21,9 @@ def published(world: Any, licence: str = "") -> DatasetInfo:
         creators=("A. Author",),
     )
     return replace(world.info(7), publication=publication)
+
+
+dataset = made_of(Croissant(), lambda world: (published(world), world.samples))
 
 
 def test_tables_list_images_and_objects_described_with_sums(dataset: Path, world: Any) -> None:

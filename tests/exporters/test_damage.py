@@ -55,6 +55,7 @@ from tests.exporters import (
     test_mcap,
     test_motchallenge,
     test_nuscenes,
+    test_nuscenes_expansions,
     test_occupancy,
     test_opendrive_export,
     test_rerun,
@@ -67,6 +68,7 @@ from tests.exporters import (
     test_tapvid,
     test_webdataset,
 )
+from tests.exporters.datasets import Source, drive, pairs, reach, street
 from tests.exporters.drives import drive_info
 from tests.exporters.label_readers import opened
 from tests.exporters.test_labels import assert_objects
@@ -189,22 +191,19 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
 
 @dataclass(frozen=True)
 class Made:
-    """An export of changed samples, and what it is held against.
+    """An export of changed samples, and the samples that it is held against.
 
     Attributes:
         kind: Format.
         folder: The data set.
-        world: Its exports are the folder, and its samples those as they were.
-        samples: Those as they were.
+        world: Its exports are the folder, and its samples are as they were.
+        samples: As they were.
     """
 
     kind: str
     folder: Path
     world: Any
     samples: Any
-
-
-Source = Callable[[Any], tuple[Any, Any]]
 
 
 @dataclass(frozen=True)
@@ -228,10 +227,6 @@ def row(samples: Source, changes: str, *tests: Callable[..., Any], **options: An
     return Row(samples, changes, tests, options)
 
 
-def street(world: Any) -> tuple[Any, Any]:
-    return world.info(7), world.samples
-
-
 def few(world: Any) -> tuple[Any, Any]:
     return world.info(7), [world.samples[0], world.samples[2]]
 
@@ -250,31 +245,6 @@ def bodies(world: Any) -> tuple[Any, Any]:
 def normals(world: Any) -> tuple[Any, Any]:
     media = {"color": (*world.info(7).media["color"], Channel.NORMALS)}
     return world.info(7, media=media), world.samples
-
-
-def drive(world: Any) -> tuple[Any, Any]:
-    return drive_info(world), world.drive()
-
-
-def pairs(world: Any) -> tuple[Any, Any]:
-    """The same with two cameras that have disparities and flow."""
-    info, samples = world.pairs()
-    return info, samples
-
-
-def reach(world: Any) -> tuple[Any, Any]:
-    """The drive with an arm that demonstrates a task."""
-    return drive_info(world), world.reach()
-
-
-def gridded(world: Any) -> tuple[Any, Any]:
-    """The drive with occupancy."""
-    return drive_info(world), test_occupancy.gridded(world)
-
-
-def tracked(world: Any) -> tuple[Any, Any]:
-    """The drive with points that are followed."""
-    return drive_info(world), test_tapvid.tracked(world)
 
 
 def slips(world: Any) -> tuple[Any, Any]:
@@ -296,7 +266,7 @@ def solo(made: Made) -> list[str]:
 
 
 ROWS = {
-    "argoverse2": row(test_argoverse2.town, "cameras, centres, points, solids",
+    "argoverse2": row(test_nuscenes_expansions.town, "cameras, centres, points, solids",
         lambda m: test_argoverse2.check_log(m.folder, m.samples)),
     "birdseye": row(street, "maps, surroundings",
         test_birdseye.test_layers_are_images_and_frames_tell_what_is_on_them),
@@ -346,7 +316,7 @@ ROWS = {
         lambda m: test_lerobot.faults(m.folder / "train/toys_arm", m.samples[:4])),
     "lidar_flow": row(drive, "categories, point ids, points, times",
         test_lidar_flow.problems),
-    "map_vectors": row(test_map_vectors.town, "streets",
+    "map_vectors": row(test_nuscenes_expansions.town, "streets",
         lambda m: test_map_vectors.check_files(m.folder)),
     "mcap": row(drive,
         "boxes, cameras, categories, centres, photographs, point ids, points, solids, times",
@@ -357,9 +327,9 @@ ROWS = {
         test_nuscenes.test_poses_intrinsics_and_scans_are_those_of_the_sensors,
         test_nuscenes.test_boxes_count_the_pulses_that_hit_and_points_are_labelled,
         test_nuscenes.test_boxes_are_in_the_global_frame_with_width_first, key_frame_s=0.1),
-    "occupancy": row(gridded, "voxels, categories",
+    "occupancy": row(test_occupancy.gridded, "voxels, categories",
         lambda m: test_occupancy.problems(m.folder, m.samples)),
-    "opendrive": row(test_opendrive_export.town, "streets",
+    "opendrive": row(test_nuscenes_expansions.town, "streets",
         lambda m: test_opendrive_export.check_files(m.folder)),
     "openlane": row(test_lane_formats.road, "cameras, centres",
         lambda m: test_lane_formats.check_edges(m.folder)),
@@ -382,7 +352,7 @@ ROWS = {
     "solo": row(street, "boxes, cameras, masks, solids", solo),
     "tables": row(scans, "measurements",
         test_tables.test_csv_holds_every_digit_that_counts_by_sequence),
-    "tapvid": row(tracked, "cameras, centres, photographs, tracks",
+    "tapvid": row(test_tapvid.tracked, "cameras, centres, photographs, tracks",
         lambda m: test_tapvid.problems(m.folder, m.samples)),
     "tfrecord": row(few, "boxes, categories, masks", labels, masks="png"),
     "tum_rgbd": row(drive, "cameras, centres, depths, photographs, times",

@@ -110,7 +110,7 @@ def test_formats_refuse_deliveries_that_they_cannot_express(name: str, world: An
 
 
 def test_the_page_of_faults_states_what_each_format_does_with_lost_and_doubled_readings() -> None:
-    """Every format is in one row of the table, which says of whose readings copies are refused."""
+    """Every format is in one row of the table, which states whose copies are refused."""
     page = (ROOT / "docs/faults.md").read_text("utf-8")
     rows = [line.strip("|").split("|") for line in page.splitlines() if line.startswith("| `")]
     stated = {

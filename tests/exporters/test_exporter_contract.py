@@ -1,4 +1,4 @@
-"""What every exporter promises, whatever it writes; a new one is tested before it has tests."""
+"""The promises of every exporter, whatever it writes; a new one is tested before it has tests."""
 
 from pathlib import Path
 from typing import Any
@@ -8,9 +8,9 @@ import pytest
 from gen_data import annotations
 from gen_data.exporters import TABLE
 from gen_data.exporters.label_map import LabelMap, MappedExporter
-from tests.exporters.drives import drive_info
+from tests.exporters.datasets import Source, drive, pairs, reach, scanned_street
+from tests.exporters.test_nuscenes_expansions import town
 from tests.exporters.test_occupancy import gridded
-from tests.exporters.test_opendrive_export import town
 from tests.exporters.test_scene_text import texts
 from tests.exporters.test_tapvid import tracked
 from tests.tiers import sampled
@@ -35,25 +35,21 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in found}
 
 
+SOURCES: dict[str, Source] = {
+    "bop": lambda world: (world.info(7), world.with_bodies(world.samples)),
+    "kitti_stereo": pairs,
+    "lidar_flow": drive,
+    "occupancy": gridded,
+    "scene_text": texts,
+    "tapvid": tracked,
+    **dict.fromkeys(("lerobot", "rlds"), reach),
+    **dict.fromkeys(("argoverse2", "map_vectors", "opendrive"), town),
+}
+"""Data sets of formats with needs; of all others the street."""
+
+
 def given(exporter: Any, world: Any) -> tuple[Any, Any]:
-    """The seven frames; a drive with cameras, an arm or voxels, or bodies, for their formats."""
-    if exporter.type == "kitti_stereo":
-        return world.pairs()
-    if exporter.type == "lidar_flow":
-        return drive_info(world), world.drive()
-    if exporter.type in ("lerobot", "rlds"):
-        return drive_info(world), world.reach()
-    if exporter.type == "occupancy":
-        return drive_info(world), gridded(world)
-    if exporter.type in ("argoverse2", "map_vectors", "opendrive"):
-        return town(world)
-    if exporter.type in ("tapvid", "scene_text"):
-        return (
-            texts(world) if exporter.type == "scene_text" else (drive_info(world), tracked(world))
-        )
-    if exporter.type == "bop":
-        return world.info(7), world.with_bodies(world.samples)
-    return world.info(7, lidars=("top",)), world.samples
+    return SOURCES.get(exporter.type, scanned_street)(world)
 
 
 @pytest.fixture(scope="module", params=sampled(TABLE.names(), 2))

@@ -30,7 +30,7 @@ def viewed(kind: str, **fields: Any) -> Any:
 
 
 def two_cameras(world: Any) -> tuple[Any, list[Any]]:
-    """A fisheye ``wide`` beside the pinhole ``color``, and a scanner."""
+    """A fisheye ``wide`` next to the pinhole ``color``, and a scanner."""
     samples = []
     for bent, sample in zip(bent_samples(world, "kannala_brandt"), world.samples, strict=False):
         wide = bent.capture.readings["color"]
@@ -60,7 +60,7 @@ def test_every_exporter_takes_cameras_sensors_and_rectify(kind: str) -> None:
 
 @pytest.mark.parametrize("cameras", [["color"], ["co*"]])
 def test_only_the_listed_cameras_are_exported(world: Any, tmp_path: Path, cameras: Any) -> None:
-    """Images, annotations and cameras of the others are absent; ids are those of the whole set."""
+    """Images, annotations and cameras of the others are absent; ids are as in the whole set."""
     info, samples = two_cameras(world)
     whole = world.export(viewed("coco", sensors=["top"]), info, samples, tmp_path / "whole")
     some = world.export(viewed("coco", cameras=cameras), info, samples, tmp_path / "some")

@@ -25,7 +25,7 @@ def read(data: bytes) -> NDArray[np.uint16]:
 
 @pytest.mark.parametrize("channel", [Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD])
 def test_flow_is_kittis(channel: Channel) -> None:
-    """U and v are (value - 2^15) / 64, the third says whether there is any."""
+    """U and v are (value - 2^15) / 64, the third states whether there is any."""
     flow = np.random.default_rng(1).uniform(-500.0, 500.0, (H, W, 2)).astype(np.float32)
     flow[2, 3] = np.nan
     flow[4, 5] = (3.0, np.nan)
@@ -39,7 +39,7 @@ def test_flow_is_kittis(channel: Channel) -> None:
 
 @pytest.mark.parametrize("beyond_px", [512.0, -512.0, 1e6, np.inf])
 def test_flow_beyond_what_the_file_can_hold_is_none(beyond_px: float) -> None:
-    """What stands still is valid, and 2^15 in both coordinates."""
+    """A point that stands still is valid, and 2^15 in both coordinates."""
     flow = np.zeros((H, W, 2), np.float32)
     flow[1, 1, 0] = beyond_px
     expected = np.tile([32768, 32768, 1], (H, W, 1))

@@ -15,6 +15,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.exporters.hdf5 import Hdf5
 from tests.exporters.conftest import MEDIA, SIZES_M
+from tests.exporters.datasets import imaging
 
 CONTAINERS = ("hdf5", "npz")
 
@@ -73,7 +74,7 @@ def wrong_geometry(data: Any, sample: Any, entries: Any) -> Iterator[str]:
         if (np.abs(from_centre.max(axis=1)) > slack[here]).any():
             yield f"instance {thing.instance_id} is not where it stands"
     up = data["normals"][seen][ids == 0] * 2.0 - 1.0
-    # Pixels beside an object mix two surfaces.
+    # Pixels at the edge of an object mix two surfaces.
     if len(up) and np.median(up @ [0.0, 1.0, 0.0]) < 0.99:
         yield "normals of the ground do not point up"
 
@@ -91,7 +92,7 @@ def test_containers_hold_the_street(dataset: Path, world: Any) -> None:
     assert [p.parent.name for p in paths] == [s.split for s in world.samples]
     for path, sample in zip(paths, world.samples, strict=True):
         assert list(problems(path, sample)) == []
-    # Other programs decode them: the archive passes its checksums, HDF5 knows the filters.
+    # Other programs decode them: the archive passes its checksums, HDF5 has the filters.
     path = next((dataset / "train").iterdir())
     if path.suffix == ".npz":
         with zipfile.ZipFile(path) as archive:
@@ -105,15 +106,11 @@ def test_containers_hold_the_street(dataset: Path, world: Any) -> None:
 @pytest.mark.parametrize("container", CONTAINERS)
 def test_layers_are_a_last_axis(container: str, world: Any, tmp_path: Path) -> None:
     sample = world.samples[0]
-    reading = sample.capture.readings["color"]
-    ids = reading.channels[Channel.INSTANCE]
+    ids = sample.capture.readings["color"].channels[Channel.INSTANCE]
     layers = np.stack([ids, np.roll(ids, 1, axis=0), np.zeros_like(ids)], axis=-1)
-    images = {**reading.channels, Channel.INSTANCE_LAYERS: layers}
-    capture = replace(sample.capture, readings={"color": replace(reading, channels=images)})
+    sample = imaging(sample, "color", {Channel.INSTANCE_LAYERS: layers})
     info = world.info(1, media={"color": (*MEDIA, Channel.INSTANCE_LAYERS)})
-    folder = world.export(
-        Hdf5(container=container), info, [replace(sample, capture=capture)], tmp_path
-    )
+    folder = world.export(Hdf5(container=container), info, [sample], tmp_path)
     (path,) = folder.rglob("0*")
     np.testing.assert_array_equal(load(path)["instance_layers"], layers)
 

@@ -11,14 +11,14 @@ import yaml
 
 from gen_data.exporters import huggingface
 from gen_data.exporters.huggingface import HuggingFace
-from tests.exporters.datasets import street_in
+from tests.exporters.datasets import made_of
 from tests.exporters.label_readers import parquet
 
-dataset = street_in(HuggingFace(rows_per_file=2))
+dataset = made_of(HuggingFace(rows_per_file=2))
 
 
 def test_parquet_files_embed_images_and_name_and_card_count_them(dataset: Path, world: Any) -> None:
-    """Read by pyarrow alone: the bytes are those of the shards' PNG files."""
+    """Read by pyarrow alone: the bytes are of the shards' PNG files."""
     rows = [r for p in sorted((dataset / "data").glob("train-*")) for r in parquet(p).to_pylist()]
     train = [s for s in world.samples if s.split == "train"]
     assert [row["image_id"] for row in rows] == [s.image_id("color") for s in train]

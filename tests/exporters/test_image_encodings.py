@@ -105,7 +105,7 @@ def test_stored_images_are_read_and_other_formats_refuse_them_with_a_remedy(
     np.testing.assert_array_equal(stored[Channel.INSTANCE], made.channels[Channel.INSTANCE])
     error = np.abs(stored[Channel.RGB].astype(int) - made.channels[Channel.RGB])
     assert error.mean() <= (0 if encoding is LOSSLESS else 4)
-    # KITTI's images are PNG; so are those of formats that say nothing.
+    # KITTI's images are PNG, as in all formats that state nothing.
     with pytest.raises(ConfigError, match=f"'color' writes {encoding.format} files.*rgb_encoding"):
         check_image_formats(Kitti(), info)
     check_image_formats(Coco(), info)
@@ -241,7 +241,7 @@ READERS: dict[str, Callable[[Path], Found]] = {
 OPTIONS: dict[str, Any] = {"voc": {"images": "png"}, "yolo": {"tasks": ("detect",)}}
 STATED = {"mcap": {"jpeg": "jpeg", "webp": "webp"}, "rerun": {"jpeg": "image/jpeg"},
           "solo": {"jpeg": "Jpg"}, "tfrecord": {"jpeg": "jpeg"}}  # fmt: skip
-"""What a data set states, by format; others state the ending of the file."""
+"""Statements of a data set, by format; others state the ending of the file."""
 
 
 @pytest.mark.parametrize("kind", READERS)

@@ -80,7 +80,7 @@ def test_readers_find_every_value(channel: Channel, values: Any, mode: str, expe
 
 @pytest.mark.parametrize("channel", [Channel.INSTANCE, Channel.PART, Channel.CATEGORY])
 def test_ids_are_16_bit_grey_up_to_the_largest(channel: Channel) -> None:
-    """Always 16 bits, also where all ids are small, so that readers need one rule."""
+    """Always 16 bits, also where all ids are small: readers need one rule."""
     ids = np.random.default_rng(1).integers(0, 65_536, (H, W), dtype=np.uint16)
     ids[0, 0], ids[0, 1] = 0, 65_535
     mode, pixels = read(encode_channel(channel, ids, 1.0))
@@ -100,7 +100,7 @@ LAYERED = {
 def test_layers_are_below_one_another_as_single_images_are(
     channel: Channel, tmp_path: Path
 ) -> None:
-    """Each layer has the pixels of its own depth or id image; reading gives all back."""
+    """Each layer has the pixels of a single depth or id image; reading gives all back."""
     layers = LAYERED[channel]
     alone = Channel.Z_DEPTH if channel is Channel.DEPTH_LAYERS else Channel.INSTANCE
     data = encode_channel(channel, layers, 0.5)
@@ -119,7 +119,7 @@ def test_layers_are_below_one_another_as_single_images_are(
 
 
 def test_depth_survives_the_file_to_half_a_unit(tmp_path: Path) -> None:
-    """0.1 mm units: never more than 0.05 mm away, and equal to what the pure function says."""
+    """0.1 mm units: never more than 0.05 mm away, and equal to the result of the pure function."""
     depth_m = np.random.default_rng(2).uniform(0.3, 6.5, (H, W)).astype(np.float32)
     _, units = read(encode_channel(Channel.Z_DEPTH, depth_m, 0.0001))
     assert np.abs(units * 0.0001 - depth_m).max() <= 0.00005 + 1e-9

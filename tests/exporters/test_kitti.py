@@ -20,7 +20,7 @@ from gen_data.core.sample import ImageTruth, ObjectTruth
 from gen_data.core.scene import Camera, Instance
 from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.exporters import kitti
-from tests.exporters.datasets import street_in
+from tests.exporters.datasets import made_of
 from tests.exporters.drives import calibration
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ def row_of(box3d_camera: OrientedBox, style: kitti.Kitti = STYLE, **changes: Any
     return kitti.label_row(ObjectTruth(crate, **fields), ImageTruth(CAMERA, ()), style)
 
 
-dataset = street_in(kitti.Kitti(low_px=2))
+dataset = made_of(kitti.Kitti(low_px=2))
 
 
 unit = st.floats(-1, 1)
@@ -114,7 +114,7 @@ def test_an_upright_object_keeps_its_box_and_one_on_end_heads_by_its_y_axis(yaw:
      ("person sitting", "", "Person_sitting"), ("cyclist", "sit", "Cyclist"), ("tram", "", "Tram")],
 )  # fmt: skip
 def test_categories_become_the_types_of_kittis_own(category: str, pose: str, kind: str) -> None:
-    """The eight names in the devkit's readme.txt; what has none of them is Misc."""
+    """The eight names in the devkit's readme.txt; all others are Misc."""
     attributes = (("pose", pose),) if pose else ()
     assert kitti.official_type(Instance(1, "it", category, 1, "it", attributes=attributes)) == kind
 
@@ -155,7 +155,7 @@ def test_every_frame_has_every_file_with_official_types_and_others_misc(dataset:
     lists = {p.stem: p.read_text().split() for p in (dataset / "ImageSets").iterdir()}
     assert (lists["val"], lists["test"]) == (["000002", "000004"], [])
     assert sorted(lists["train"] + lists["val"]) == frames
-    # Cars and pedestrians have types of their own, crates have none; heights come first.
+    # Cars and pedestrians have types, crates have none; heights come first.
     text = (dataset / "training/label_2/000000.txt").read_text()
     rows = [line.split(" ") for line in text.splitlines()]
     assert [row[0] for row in rows] == ["Car", "Pedestrian", "Misc", "Misc", "Pedestrian"]
@@ -215,7 +215,7 @@ def test_wide_boxes_of_people_leave_the_image_box_at_the_silhouette_and_a_margin
 
 
 def test_image_boxes_bound_the_projected_boxes_inside_the_image(dataset: Path) -> None:
-    """P2 R0 x, clipped, to the hundredth of a pixel; what is clipped off is the truncation."""
+    """P2 R0 x, clipped, to the hundredth of a pixel; the truncation is the share clipped off."""
     compared = 0
     for path in sorted((dataset / "training/label_2").iterdir()):
         calib = devkit_calib(dataset / f"training/calib/{path.stem}.txt")
@@ -239,7 +239,7 @@ def test_image_boxes_bound_the_projected_boxes_inside_the_image(dataset: Path) -
 FAR = {"box3d_camera": OrientedBox(SE3((0.0, 0.0, 79.0)), (1.0, 1.0, 1.0))}
 FARTHER = {"box3d_camera": OrientedBox(SE3((0.0, 0.0, 81.0)), (1.0, 1.0, 1.0))}
 BEHIND = {"box3d_camera": OrientedBox(SE3((0.0, 0.0, -0.1)), (1, 1, 1))}
-# A lorry beside the camera reaches behind it: readers project its corners differently.
+# A lorry at the side of the camera reaches behind it: readers project its corners differently.
 BESIDE = {"box3d_camera": OrientedBox(SE3((-2.5, 0.0, 3.0)), (2.0, 3.0, 10.0))}
 
 
@@ -257,7 +257,7 @@ def test_what_kitti_cannot_say_is_dont_care(
 ) -> None:
     """One pixel wide, partly behind the camera, beyond 80 m or lower than its annotators' limit.
 
-    A valid box and KITTI's constants; nearer things are labelled.
+    A valid box and KITTI's constants; nearer objects are labelled.
     """
     fields = {"box3d_camera": OrientedBox(SE3((0, 0, 5.0)), (1, 1, 1)), **changes}
     row = row_of(style=STYLE if low_px else kitti.Kitti(), **fields)

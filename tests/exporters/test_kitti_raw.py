@@ -11,10 +11,12 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.core.se3 import SE3
 from gen_data.exporters.kitti_raw import KittiRaw, luma
 from gen_data.exporters.sequences import timestamp
+from tests.exporters.datasets import in_scene
 from tests.exporters.drives import DRIVE, calibration, drive_info, rigid, stems
 
 
@@ -33,11 +35,7 @@ def test_raw_files_hold_the_samples_of_their_frames(exported: Any, samples: Any)
     drive = exported(KittiRaw(image_03="right")) / DRIVE.format(1)
     image = cv2.imread(str(drive / "image_03/data/0000000002.png"))
     points = np.fromfile(drive / "velodyne_points/data/0000000002.bin", "<f4").reshape(-1, 4)
-    (rgb,) = (
-        array
-        for channel, array in samples[6].capture.readings["right"].channels.items()
-        if channel.value == "rgb"
-    )
+    rgb = samples[6].capture.readings["right"].channels[Channel.RGB]
     np.testing.assert_array_equal(image[..., ::-1], rgb)
     expected = samples[6].capture.clouds["top"].points
     np.testing.assert_array_equal(points[:, :3], expected["position_m"])
@@ -67,14 +65,14 @@ def test_raw_times_have_nine_digits_and_grey_images_the_luma_of_colours(exported
 
 
 def test_raw_calibration_maps_points_into_their_image(exported: Any, samples: Any) -> None:
-    """By the devkit's formula, P_rect_03 R_rect_00 Tr x: points on a thing fall on its mask."""
+    """By the devkit's formula, P_rect_03 R_rect_00 Tr x: points on an object fall on its mask."""
     folder = exported(KittiRaw(image_03="right")) / "2011_09_26"
     cameras = calibration(folder / "calib_cam_to_cam.txt")
     T_cam_velo = rigid(calibration(folder / "calib_velo_to_cam.txt"))
     for sample in samples:
         points = sample.capture.clouds["top"].points
         reading = sample.capture.readings["right"]
-        (ids,) = (a for c, a in reading.channels.items() if c.value == "instance")
+        ids = reading.channels[Channel.INSTANCE]
         mine = points[np.isin(points["instance_id"], [1, 2, 4])]
         homogeneous = np.column_stack([mine["position_m"], np.ones(len(mine))])
         p = cameras["P_rect_03"].reshape(3, 4) @ T_cam_velo @ homogeneous.T
@@ -117,9 +115,7 @@ def test_tracklets_enclose_the_points_of_their_object(exported: Any, samples: An
 def test_another_calibration_has_another_date(world: Any, samples: Any, tmp_path: Path) -> None:
     wider = SE3((0.0, 0.0, 1.93))
     moved = [
-        replace(s, scene=replace(s.scene, lidars=(replace(s.scene.lidars[0], T_rig_lidar=wider),)))
-        if s.scene_index
-        else s
+        in_scene(s, lidars=(replace(s.scene.lidars[0], T_rig_lidar=wider),)) if s.scene_index else s
         for s in samples
     ]
     folder = world.export(KittiRaw(), drive_info(world), moved, tmp_path)
@@ -132,15 +128,13 @@ def test_another_calibration_has_another_date(world: Any, samples: Any, tmp_path
 
 
 def test_cameras_that_look_elsewhere_are_no_pair(world: Any, samples: Any, tmp_path: Path) -> None:
-    """The message names the camera and what to do."""
+    """The message names the camera and the remedy."""
     sample = samples[0]
     left, right = sample.scene.cameras
     turned = replace(right, T_rig_camera=SE3.about_z(0.1) @ right.T_rig_camera)
-    scene = replace(sample.scene, cameras=(left, turned))
+    apart = in_scene(sample, cameras=(left, turned))
     with pytest.raises(ConfigError, match=r"'right' is not parallel.*same yaw"):
-        world.export(
-            KittiRaw(image_03="right"), drive_info(world), [replace(sample, scene=scene)], tmp_path
-        )
+        world.export(KittiRaw(image_03="right"), drive_info(world), [apart], tmp_path)
 
 
 @pytest.mark.parametrize("date", ["2011-09-26", "2011_13_01", "2011_9_26", "today"])

@@ -15,6 +15,7 @@ from gen_data.core.se3 import SE3
 from gen_data.exporters.cityscapes import Cityscapes
 from gen_data.exporters.kitti_stereo import KittiStereo
 from gen_data.sensors.camera.rgb_camera import RgbCamera
+from tests.exporters.datasets import in_scene, made_of, pairs, with_sensor
 from tests.exporters.drives import calibration
 
 BASELINE_M = 0.54
@@ -34,12 +35,7 @@ def read_flow(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return (raw[..., :2].astype(float) - 2.0**15) / 64.0, raw[..., 2] > 0
 
 
-@pytest.fixture(scope="module")
-def tree(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The drive of two sequences with four steps each, exported."""
-    info, samples = world.pairs()
-    root: Path = world.export(KittiStereo(), info, samples, tmp_path_factory.mktemp("stereo"))
-    return root
+tree = made_of(KittiStereo(), pairs)
 
 
 def test_disparities_are_those_of_depth(tree: Path, world: Any) -> None:
@@ -116,10 +112,9 @@ def test_every_frame_has_both_images_and_those_of_the_next_step_and_a_split(tree
 def test_without_flow_the_last_step_is_a_frame_too(world: Any, tmp_path: Path) -> None:
     """A pair of images and its disparities are complete without a next step."""
     info, samples = world.pairs()
-    left = info.sensor("left")
-    kept = tuple(c for c in left.channels if not c.value.startswith("flow"))
-    sensors = tuple(replace(s, channels=kept) if s is left else s for s in info.sensors)
-    root = world.export(KittiStereo(), replace(info, sensors=sensors), samples, tmp_path)
+    kept = tuple(c for c in info.sensor("left").channels if not c.value.startswith("flow"))
+    info = with_sensor(info, "left", channels=kept)
+    root = world.export(KittiStereo(), info, samples, tmp_path)
     for folder in ("image_2", "disp_occ_0"):
         assert len(list((root / "training" / folder).glob("*_10.png"))) == 8
 
@@ -143,7 +138,7 @@ def test_data_sets_without_a_rectified_pair_are_refused(world: Any, tmp_path: Pa
     up = SE3((0.0, -0.1, 0.0))
     high = replace(low, T_world_camera=low.T_world_camera @ up, T_rig_camera=low.T_rig_camera @ up)
     cameras = tuple(high if c.name == "right" else c for c in scene.cameras)
-    wrong = replace(samples[0], scene=replace(scene, cameras=cameras))
+    wrong = in_scene(samples[0], cameras=cameras)
     with pytest.raises(ConfigError, match=r"'left' and 'right' are not a rectified pair: .*below"):
         world.export(KittiStereo(), info, [wrong], tmp_path)
 

@@ -46,7 +46,7 @@ def test_classes_are_of_one_or_several_categories(world: Any) -> None:
     assert applied.info.categories == ("b", "a")
     assert {(t.instance.category, t.instance.category_id) for t in things} == {("b", 1), ("a", 2)}
     assert len(things) == categories(world)[first] + categories(world)[second]
-    # And a class without categories takes the category of its own name.
+    # And a class without categories takes the category of its name.
     merged = parse(json.dumps({"classes": {"all": [first, second]}}))
     own = parse(json.dumps({"classes": {first: None}}))
     counts = categories(world)
@@ -188,7 +188,7 @@ def test_public_lists_have_the_published_classes_and_others_may_be_empty() -> No
 
 @pytest.mark.parametrize("name", ["nyu40", "ade20k"])
 def test_every_category_of_rooms_has_a_class_or_is_listed_without_one(name: Any) -> None:
-    """So that no pixel of a room loses its class unseen."""
+    """No pixel of a room loses its class unseen."""
     text = files("gen_data.exporters").joinpath("label_maps.yaml").read_text("utf-8")
     without = yaml.safe_load(text)["without_class"][name]
     mapped = {c for own in LabelMap(classes=name).classes_of.values() for c in own}

@@ -26,7 +26,7 @@ def divided(world: Any) -> Any:
 
 
 def truth_of(sample: Any, camera: str = "color") -> list[Found]:
-    """Visible objects of an image; masks are those of the image of instances."""
+    """Visible objects of an image; masks are parts of the image of instances."""
     ids = sample.capture.readings[camera].channels[Channel.INSTANCE]
     return [
         Found(

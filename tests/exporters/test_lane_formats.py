@@ -13,7 +13,6 @@ import pytest
 
 from gen_data.annotations.lanes import Lanes
 from gen_data.core.capture import Capture, Channel, SensorReading
-from gen_data.core.errors import ConfigError
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, Sample
 from gen_data.core.scene import Body, Camera, Rig, Scene
@@ -299,19 +298,3 @@ def test_projected_borders_score_perfectly_by_the_overlap_of_wide_lines(culane: 
 def test_edges_without_paint_are_lines_only_if_asked_for(world: Any, tmp_path: Path) -> None:
     folder = write(world, CULane(), tmp_path)
     assert (folder / "list/train_gt.txt").read_text().split()[2:] == ["1", "1", "0", "0"]
-
-
-def test_openlane_refuses_bent_lenses(world: Any) -> None:
-    info = world.info(
-        1, ("front",), media={"front": (Channel.RGB,)}, lenses={"front": "kannala_brandt"}
-    )
-    with pytest.raises(ConfigError, match=r"openlane.*pinhole"):
-        OpenLane().check(info)
-    CULane().check(info)
-
-
-@pytest.mark.parametrize("exporter", [OpenLane(), CULane()])
-def test_scenes_without_a_street_are_refused(exporter: OpenLane | CULane) -> None:
-    exporter.check_scene(scene())
-    with pytest.raises(ConfigError, match=r"lane.*: the scene has no driving lane; add an element"):
-        exporter.check_scene(Scene("table"))

@@ -72,7 +72,7 @@ def test_relations_have_both_directions(world: Any, samples: list[Sample], tmp_p
 
 
 def test_label_maps_drop_relations_and_text_too(world: Any, samples: list[Sample]) -> None:
-    """What is left names only objects that are left, and says the same as before."""
+    """Texts that are left name only objects that are left, and are the same as before."""
     first = samples[0].truth["color"]
     dropped = first.objects[0].instance.category
     kept = {t.instance.category for t in first.objects} - {dropped}

@@ -15,11 +15,13 @@ import pyarrow.parquet
 import pytest
 from PIL import Image
 
+from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import ArmGoal
 from gen_data.exporters import lerobot_files
 from gen_data.exporters.lerobot import LeRobot, task_sentence
 from gen_data.exporters.lerobot_statistics import image_sums
+from tests.exporters.datasets import with_sensor
 from tests.exporters.drives import drive_info
 from tests.exporters.label_readers import json_lines
 
@@ -106,8 +108,7 @@ def faults(folder: Path, samples: Any) -> list[str]:
             if list(pixels.shape) != shape:
                 found.append(f"{camera} shape")
             reading = sample.capture.readings[camera]
-            (expected,) = (a for c, a in reading.channels.items() if c.value == "rgb")
-            if not np.array_equal(pixels, expected):
+            if not np.array_equal(pixels, reading.channels[Channel.RGB]):
                 found.append(f"{camera} pixels")
     return found + stats_faults(folder, rows)
 
@@ -123,7 +124,7 @@ def stats_faults(folder: Path, rows: list[dict[str, Any]]) -> list[str]:
 
 
 def differences(stats: dict[str, Any], rows: list[dict[str, Any]]) -> list[str]:
-    """Statistics of features that are not those of the rows."""
+    """Statistics of features that differ from the rows."""
     found = []
     for name, one in stats.items():
         if name.startswith("observation.images"):
@@ -177,7 +178,7 @@ def test_episodes_share_files_as_far_as_these_have_room(
 
 
 def test_quantiles_are_those_of_the_stored_values(shared_files: Path) -> None:
-    """Those of all episodes are means of the episodes', as LeRobot merges them."""
+    """For all episodes they are means of the episodes', as LeRobot merges them."""
     rows, whole = rows_of(shared_files), json.loads((shared_files / "meta/stats.json").read_text())
     states = np.array([row["observation.state"] for row in rows], np.float64).reshape(2, 4, -1)
     for key, share in {"q01": 0.01, "q50": 0.5, "q99": 0.99}.items():
@@ -193,7 +194,7 @@ import torch
 try:
     import torchvision
 except RuntimeError:
-    # Its compiled operators do not load beside a build of torch for processors only. LeRobot needs
+    # Its compiled operators do not load with a build of torch for processors only. LeRobot needs
     # none of them; once they are declared, the rest can be imported.
     library = torch.library.Library("torchvision", "DEF")
     library.define("nms(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
@@ -261,17 +262,13 @@ def test_tasks_are_sentences(reach: Any) -> None:
 def test_data_sets_without_arms_and_cameras_that_skip_steps_are_refused(
     world: Any, samples: Any, tmp_path: Path
 ) -> None:
-    """By the nominal scene, before anything is rendered; with the field to set."""
-    with pytest.raises(ConfigError, match="exporter 'lerobot': the scene has no arm; add an elem"):
-        LeRobot().check_scene(samples[0].scene)
+    """Of a scene of the data set, and with the field to set."""
     with pytest.raises(ConfigError, match="the scene has no arm; add an element of type robot"):
         world.export(LeRobot(), drive_info(world), samples, tmp_path / "a")
     with pytest.raises(ConfigError, match="has no arm 'leg'; expected one of: arm"):
         world.export(LeRobot(arm="leg"), drive_info(world), world.reach(), tmp_path / "b")
     # Every frame has an image of every camera.
-    info = drive_info(world)
-    slow = tuple(replace(s, rate_hz=5.0) if s.name == "right" else s for s in info.sensors)
-    info = replace(info, sensors=slow)
+    info = with_sensor(drive_info(world), "right", rate_hz=5.0)
     with pytest.raises(ConfigError, match="camera 'right' reads 5 times per second"):
         LeRobot().check(info)
     LeRobot(cameras=("left",)).check(info)
@@ -279,7 +276,7 @@ def test_data_sets_without_arms_and_cameras_that_skip_steps_are_refused(
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
 def test_a_missing_sample_ends_the_episode(world: Any, tmp_path: Path, version: Any) -> None:
-    """Frames are 1 / fps apart by definition: what follows a gap is another episode."""
+    """Frames are 1 / fps apart by definition: after a gap comes another episode."""
     samples = [replace(sample, split="train") for sample in world.reach()]
     kept = [sample for sample in samples if sample.index != 1]
     folder = world.export(LeRobot(version=version), drive_info(world), kept, tmp_path)

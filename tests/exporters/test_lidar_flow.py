@@ -19,6 +19,7 @@ from gen_data.core.scene_time import place_sensors, scene_at
 from gen_data.core.se3 import SE3, Array
 from gen_data.exporters.lidar_flow import LidarFlow, SceneFlow, scene_flow
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
+from tests.exporters.datasets import scanning, with_sensor
 from tests.exporters.drives import drive_info
 from tests.libraries import library
 from tests.renderers.fake_library import FakeLibrary, box_mesh
@@ -194,12 +195,10 @@ def in_the_air(samples: Any) -> list[Any]:
     """The samples of a drive; each tenth point of the ground is a return from the air."""
     changed = []
     for sample in samples:
-        cloud = sample.capture.clouds["top"]
-        points = cloud.points.copy()
+        points = sample.capture.clouds["top"].points.copy()
         ground = np.flatnonzero(points["instance_id"] == 0)
         points["surface"][ground[::10]] = SURFACES.index("air")
-        capture = replace(sample.capture, clouds={"top": replace(cloud, points=points)})
-        changed.append(replace(sample, capture=capture))
+        changed.append(scanning(sample, points))
     return changed
 
 
@@ -260,15 +259,12 @@ def test_files_hold_the_motion_of_the_drive_for_each_pair_of_scans(
 
 def test_a_slower_scanner_has_its_flow_to_its_next_scan(world: Any, tmp_path: Path) -> None:
     """Scans at every second step: the only pair of a sequence is 0.2 s apart."""
-    info = drive_info(world)
-    sensors = tuple(replace(s, rate_hz=5.0) if s.name == "top" else s for s in info.sensors)
+    info = with_sensor(drive_info(world), "top", rate_hz=5.0)
     samples = [
         s if s.step_index % 2 == 0 else replace(s, capture=replace(s.capture, clouds={}))
         for s in world.drive()
     ]
-    folder = world.export(
-        LidarFlow(layouts=("kitti",)), replace(info, sensors=sensors), samples, tmp_path
-    )
+    folder = world.export(LidarFlow(layouts=("kitti",)), info, samples, tmp_path)
     assert not (folder / "av2").exists()
     scans = sorted((folder / "kitti").glob("*/*.npz"))
     assert [path.stem for path in scans] == ["000000_000000", "000001_000000"]
@@ -287,17 +283,11 @@ def test_points_are_as_old_as_their_pulses_unless_all_leave_at_once(
     """Pulses that left nine seconds before the car and the person set off meet them at rest."""
     samples = []
     for sample in world.drive()[:2]:
-        cloud = sample.capture.clouds["top"]
-        points = cloud.points.copy()
+        points = sample.capture.clouds["top"].points.copy()
         points["time_s"][points["instance_id"] > 0] = -9.0
-        capture = replace(sample.capture, clouds={"top": replace(cloud, points=points)})
-        samples.append(replace(sample, capture=capture))
-    info = drive_info(world)
-    sensors = tuple(
-        replace(s, motion_distortion=motion) if s.name == "top" else s for s in info.sensors
-    )
-    exporter = LidarFlow(layouts=("kitti",))
-    folder = world.export(exporter, replace(info, sensors=sensors), samples, tmp_path)
+        samples.append(scanning(sample, points))
+    info = with_sensor(drive_info(world), "top", motion_distortion=motion)
+    folder = world.export(LidarFlow(layouts=("kitti",)), info, samples, tmp_path)
     (scan,) = (folder / "kitti").glob("*/*.npz")
     true = truth(world, samples[0])
     expected = true["flow"] if moves else true["flow"] - true["moved"] @ turn_of(world, 0.1)
@@ -321,10 +311,9 @@ def turn_of(world: Any, time_s: float) -> Array:
 def test_data_sets_without_a_next_scan_or_a_common_frame_are_refused(
     world: Any, changes: dict[str, Any], sensor: dict[str, Any], text: str
 ) -> None:
-    info = replace(drive_info(world), **changes)
-    sensors = tuple(replace(s, **sensor) if s.name == "top" else s for s in info.sensors)
+    info = with_sensor(replace(drive_info(world), **changes), "top", **sensor)
     with pytest.raises(ConfigError, match=f"exporter 'lidar_flow'.*{text}"):
-        LidarFlow().check(replace(info, sensors=sensors))
+        LidarFlow().check(info)
 
 
 @pytest.mark.parametrize("motion", ["raw", "deskewed", "none"])

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from gen_data.core.errors import ConfigError
-from gen_data.core.scene import Body, Rig, Scene
+from gen_data.core.scene import Body, Rig
 from gen_data.core.se3 import SE3
 from gen_data.exporters.map_vectors import MapVectors, world_lines
-from tests.exporters.drives import drive_info
-from tests.exporters.test_nuscenes_expansions import on_streets, streets
+from tests.exporters.datasets import made_of
+from tests.exporters.label_readers import json_lines
+from tests.exporters.test_nuscenes_expansions import streets, town
 from tests.libraries import library
 
 EGO = SE3.about_z(np.pi, (32.0, 5.25, 0.0))
@@ -76,12 +77,12 @@ def evenly(line: Any, count: int = 100) -> Any:
     return np.stack([np.interp(even, at, line[:, k]) for k in range(2)], axis=1)
 
 
-def test_the_road_as_prediction_scores_perfectly_and_elsewhere_worse(
-    world: Any, tmp_path: Path
-) -> None:
+dataset = made_of(MapVectors(), town, library)
+
+
+def test_the_road_as_prediction_scores_perfectly_and_elsewhere_worse(dataset: Path) -> None:
     """Chamfer distances of 0 to lines of the ground truth; a shift by 2 m exceeds 1.5 m."""
-    folder = world.export(MapVectors(), *town(world), tmp_path, assets=library())
-    truth = json.loads((folder / "train_map_anns.json").read_text())["GTs"]
+    truth = json.loads((dataset / "train_map_anns.json").read_text())["GTs"]
     assert [row["sample_token"] for row in truth] == [f"{k:09d}" for k in range(4)]
     lines = [v for v in truth[0]["vectors"] if v["cls_name"] == "divider"]
     assert {v["type"] for v in lines} == {0} and all(v["pts_num"] == len(v["pts"]) for v in lines)
@@ -94,33 +95,25 @@ def test_the_road_as_prediction_scores_perfectly_and_elsewhere_worse(
         assert min(moved) >= 1.5 - 1e-3
 
 
-def town(world: Any) -> tuple[Any, Any]:
-    """A drive on the road; every sample's ego begins at its start, in the middle."""
-    return drive_info(world), on_streets(world.drive())
-
-
 def check_files(folder: Path) -> None:
     """Centre lines of the four lanes before the ego at the start of the road."""
-    row = json.loads((folder / "train.jsonl").read_text().splitlines()[0])
+    row = json_lines(folder / "train.jsonl")[0]
     lines = [np.array(line) for line in row["annotation"]["centerline"]]
     found = sorted(round(float(line[:, 1].mean()), 3) for line in lines)
     assert found == [-5.25, -1.75, 1.75, 5.25]
     assert {round(float(line[:, 0].min()), 4) for line in lines} == {0.0}
 
 
-def test_lines_name_their_samples(world: Any, tmp_path: Path) -> None:
-    folder = world.export(MapVectors(), *town(world), tmp_path, assets=library())
-    check_files(folder)
-    rows = [json.loads(line) for line in (folder / "val.jsonl").read_text().splitlines()]
+def test_lines_name_their_samples(dataset: Path) -> None:
+    check_files(dataset)
+    rows = json_lines(dataset / "val.jsonl")
     assert [(row["index"], row["scene"], row["step"]) for row in rows] == [
         (4 + k, 1, k) for k in range(4)
     ]
     np.testing.assert_allclose(rows[0]["T_world_ego"], np.eye(4), atol=1e-9)
 
 
-def test_scenes_without_a_street_or_a_rig_are_refused() -> None:
-    with pytest.raises(ConfigError, match=r"map_vectors.*no driving lane; add an element 'road'"):
-        MapVectors().check_scene(Scene("room"))
+def test_scenes_without_a_rig_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"there is no rig ''; expected one of: none"):
         MapVectors().check_scene(streets())
     with_ego = replace(streets(), rigs=(Rig("ego", "ego"),), bodies=(Body("ego", "car"),))

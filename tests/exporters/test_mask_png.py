@@ -45,7 +45,7 @@ def test_runs_of_every_length_come_back_and_a_full_image_is_small() -> None:
         np.testing.assert_array_equal(decoded(png), [[255] * width, [0] * width])
     for mask in (None, MaskPx(0, 0, np.zeros((0, 0), bool))):
         assert not decoded(encode_mask(mask, 48, 64)).any()
-    # Its bytes are those of the runs.
+    # Its bytes are of the runs.
     png = encode_mask(MaskPx(0, 0, np.ones((480, 640), bool)), 480, 640)
     assert decoded(png).min() == 255
     assert len(png) < 8_000

@@ -12,7 +12,7 @@ from tests.exporters.drives import stems
 
 
 def test_mot_rows_count_from_1_and_sequences_describe_them(exported: Any, samples: Any) -> None:
-    """Frames, ids and pixels; boxes are those of the visible pixels."""
+    """Frames, ids and pixels; boxes are around the visible pixels."""
     folder = exported(MotChallenge()) / "street-val/street-0001"
     rows = [line.split(",") for line in (folder / "gt/gt.txt").read_text().splitlines()]
     assert stems(folder / "img1") == [f"{k:06d}" for k in range(1, 5)]

@@ -21,6 +21,7 @@ from gen_data.exporters.nuscenes import NuScenes
 from gen_data.exporters.nuscenes_classes import attribute_of, category_of, classes
 from gen_data.exporters.nuscenes_frames import annotated_things, views_by_instance, visibility_level
 from gen_data.sensors.radar.radar_sensor import Radar
+from tests.exporters.datasets import in_scene, scanning
 from tests.exporters.drives import drive_info
 
 ORIGIN_M = (50.0, 50.0, 0.0)
@@ -214,16 +215,14 @@ def swept(sample: Any) -> Any:
     cloud = sample.capture.clouds["top"]
     points = cloud.points.copy()
     points["time_s"] = 0.1
-    lidar = replace(cloud.lidar, sweep_s=0.1)
-    clouds = {"top": replace(cloud, points=points, lidar=lidar)}
-    return replace(sample, capture=replace(sample.capture, clouds=clouds))
+    return scanning(sample, points, lidar=replace(cloud.lidar, sweep_s=0.1))
 
 
 @pytest.mark.parametrize(("boxes_at", "ahead_m"), [("pulse", 0.4), ("step", 0.0)])
 def test_boxes_are_where_pulses_hit_the_object(
     world: Any, samples: Any, tmp_path: Path, boxes_at: Any, ahead_m: float
 ) -> None:
-    """Half a sweep later, the car at 8 m/s is 0.4 m ahead; what stands is where it was."""
+    """Half a sweep later, the car at 8 m/s is 0.4 m ahead; the crate is where it was."""
     sample = swept(samples[1])
     exporter = NuScenes(boxes_at=boxes_at, box_margin_m=0.0)
     folder = world.export(exporter, drive_info(world), [sample], tmp_path)
@@ -246,11 +245,8 @@ def test_ignored_objects_have_no_box_and_visibility_adds_up(world: Any, samples:
     instances = tuple(
         replace(i, annotated=False) if i.instance_id == 4 else i for i in sample.scene.instances
     )
-    changed = replace(
-        sample,
-        truth={**sample.truth, "left": replace(image, objects=flagged)},
-        scene=replace(sample.scene, instances=instances),
-    )
+    truth = {**sample.truth, "left": replace(image, objects=flagged)}
+    changed = replace(in_scene(sample, instances=instances), truth=truth)
     assert set(annotated_things(sample)) == {1, 2, 4}
     assert set(annotated_things(changed)) == {1}
     views = views_by_instance(samples[0])[1]
@@ -288,10 +284,9 @@ def without(sample: Any, numbers: tuple[int, ...]) -> Any:
         )
         for name, image in sample.truth.items()
     }
-    cloud = sample.capture.clouds["top"]
-    points = cloud.points[~np.isin(cloud.points["instance_id"], numbers)]
-    clouds = {"top": replace(cloud, points=points)}
-    return replace(sample, truth=truth, capture=replace(sample.capture, clouds=clouds))
+    points = sample.capture.clouds["top"].points
+    sensed = points[~np.isin(points["instance_id"], numbers)]
+    return replace(scanning(sample, sensed), truth=truth)
 
 
 def test_maps_show_where_one_may_drive() -> None:
@@ -322,7 +317,7 @@ def test_classes_have_names_of_nuscenes_and_attributes_tell_how_objects_stand(wo
     assert len(names) == len(set(names)) == 32
     assert set(classes().things.values()) | set(classes().surfaces.values()) <= set(names)
     assert set(classes().surfaces) <= set(SURFACES)
-    # Parked beside the lanes, stopped in traffic, moving by speed, people by their pose.
+    # Parked next to the lanes, stopped in traffic, moving by speed, people by their pose.
     groups = tuple(
         ObjectGroup(name, (), (), 1, "along", lanes=(kind,))
         for name, kind in (("parked", "parking"), ("traffic", "driving"))
@@ -354,10 +349,7 @@ def test_classes_have_names_of_nuscenes_and_attributes_tell_how_objects_stand(wo
 
 def test_a_scan_without_returns_is_a_key_frame(world: Any, samples: Any, tmp_path: Path) -> None:
     """Its files are empty; boxes that cameras see count no point."""
-    sample = samples[0]
-    cloud = sample.capture.clouds["top"]
-    clouds = {"top": replace(cloud, points=cloud.points[:0])}
-    empty = replace(sample, capture=replace(sample.capture, clouds=clouds))
+    empty = scanning(samples[0], samples[0].capture.clouds["top"].points[:0])
     folder = world.export(NuScenes(), drive_info(world), [empty], tmp_path)
     (row,) = readings(folder, "LIDAR_TOP")
     assert (folder / row["filename"]).stat().st_size == 0

@@ -16,8 +16,8 @@ from gen_data.core.scene_time import place_sensors
 from gen_data.core.se3 import SE3
 from gen_data.exporters.nuscenes import NuScenes
 from gen_data.sensors.radar.radar_sensor import Radar
-from tests.exporters.drives import drive_info
-from tests.exporters.test_nuscenes_expansions import on_streets, streets
+from tests.exporters.datasets import made_of
+from tests.exporters.test_nuscenes_expansions import EXPANDED, streets, town
 from tests.libraries import library
 
 # The devkit and its dependencies are older than the NumPy and Matplotlib that they run with.
@@ -40,16 +40,17 @@ def with_radar(sample: Any) -> Any:
 
 
 @pytest.fixture(scope="module")
-def driven(samples: Any) -> Any:
-    return [with_radar(sample) for sample in samples]
+def driven(world: Any) -> Any:
+    return radar_drive(world)[1]
 
 
-@pytest.fixture(scope="module")
-def folder(world: Any, driven: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def radar_drive(world: Any) -> tuple[Any, Any]:
     info = world.info(8, ("left", "right"), ("top",), steps_per_scene=4, devices={"front": "radar"})
-    exporter = NuScenes(key_frame_s=0.1)
-    made: Path = world.export(exporter, info, driven, tmp_path_factory.mktemp("nuscenes"))
-    return made
+    return info, list(map(with_radar, world.drive()))
+
+
+folder = made_of(NuScenes(key_frame_s=0.1), radar_drive)
+expanded = made_of(EXPANDED, town, library)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +61,7 @@ def devkit(folder: Path) -> Any:
 
 
 def detection_faults(devkit: Any, predicted: Callable[[Any], Any], folder: Path) -> Iterator[str]:
-    """What the evaluation of predictions finds: less than AP 1, and errors of classes."""
+    """Faults that the evaluation of predictions finds: less than AP 1, and errors of classes."""
     from nuscenes.eval.common.config import config_factory
     from nuscenes.eval.detection.evaluate import DetectionEval
 
@@ -237,18 +238,10 @@ def test_the_lidarseg_evaluation_scores_the_labels_as_perfect(
     assert min(other) < 0.7
 
 
-@pytest.fixture(scope="module")
-def expanded(world: Any, samples: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    exporter = NuScenes(key_frame_s=0.1, map_expansion=True, can_bus=True)
-    drive, folder = on_streets(samples), tmp_path_factory.mktemp("expanded")
-    made: Path = world.export(exporter, drive_info(world), drive, folder, assets=library())
-    return made
-
-
 def test_the_map_api_renders_every_layer_and_finds_the_closest_lane(
     expanded: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also the lanes that come next; the centre lines are those of the scene within 2 cm."""
+    """Also the lanes that come next; the centre lines agree with the scene within 2 cm."""
     import matplotlib as mpl
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline

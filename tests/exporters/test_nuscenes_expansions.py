@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gen_data.core.errors import ConfigError
-from gen_data.core.scene import Lane, Scene
+from gen_data.core.scene import Scene
 from gen_data.exporters.arc_paths import arc_paths
 from gen_data.exporters.nuscenes import NuScenes
 from gen_data.exporters.nuscenes_map import LISTS, segment_type
@@ -24,6 +24,7 @@ from gen_data.scene_templates.junction import Junction
 from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.signals import Signals
 from tests.exporters.conftest import SPEED_M_S, TURN_RAD_S, ego_pose
+from tests.exporters.datasets import in_scene, made_of
 from tests.exporters.drives import drive_info
 from tests.libraries import library
 
@@ -43,28 +44,17 @@ def streets() -> Scene:
 
 def on_streets(samples: Sequence[Any]) -> list[Any]:
     """The samples of a drive on these streets; each sequence is in a world of its number."""
-    town = streets()
-    return [
-        replace(
-            sample,
-            scene=replace(
-                sample.scene,
-                lanes=town.lanes,
-                bodies=(*sample.scene.bodies, *(b for b in town.bodies if not b.instance_id)),
-            ),
-        )
-        for sample in samples
-    ]
+    ground = tuple(b for b in streets().bodies if not b.instance_id)
+    return [in_scene(s, lanes=streets().lanes, bodies=(*s.scene.bodies, *ground)) for s in samples]
 
 
-@pytest.fixture(scope="module")
-def every(world: Any, samples: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    exporter = NuScenes(key_frame_s=0.1, map_expansion=True, can_bus=True)
-    folder = tmp_path_factory.mktemp("nuscenes")
-    made: Path = world.export(
-        exporter, drive_info(world), on_streets(samples), folder, assets=library()
-    )
-    return made
+def town(world: Any) -> tuple[Any, Any]:
+    """A drive on the streets; the ego of each sequence begins at their start, in the middle."""
+    return drive_info(world), on_streets(world.drive())
+
+
+EXPANDED = NuScenes(key_frame_s=0.1, map_expansion=True, can_bus=True)
+every = made_of(EXPANDED, town, library)
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +142,7 @@ def test_stop_lines_are_where_they_are_painted_and_name_crosswalks_or_lights(
 
 
 def test_dividers_have_the_paint_of_the_road(layers: dict[str, Any]) -> None:
-    """Dashes between lanes of one direction, of which the format knows one type."""
+    """Dashes between lanes of one direction, of which the format has one type."""
     types = {s["segment_type"] for row in layers["lane_divider"]
              for s in row["lane_divider_segments"]}  # fmt: skip
     assert types == {"DOUBLE_DASHED_WHITE"} and len(layers["lane_divider"]) == 6
@@ -257,16 +247,7 @@ def test_nothing_is_written_unless_asked_for(exported: Any) -> None:
     assert names == ["gen-scene-000000", "gen-scene-000001"]
 
 
-def test_scenes_without_a_street_or_a_vehicle_are_refused(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
-    with pytest.raises(ConfigError, match=r"map_expansion needs a street.*'road'"):
-        NuScenes(map_expansion=True).check_scene(Scene("room"))
-    lane = Lane("main/forward0", "driving", ((0.0, 0.0, 0.0), (9.0, 0.0, 0.0)), 3.5)
-    NuScenes(map_expansion=True).check_scene(Scene("street", lanes=(lane,)))
-    with pytest.raises(ConfigError, match="8000 sequences, but there are 8001"):
-        NuScenes(can_bus=True).check(replace(drive_info(world), n=8001 * 4))
-    still = [replace(s, scene=replace(s.scene, rigs=(replace(s.scene.rigs[0], body=""),)))
-             for s in samples[:1]]  # fmt: skip
+def test_messages_without_a_vehicle_are_refused(world: Any, samples: Any, tmp_path: Path) -> None:
+    still = [in_scene(s, rigs=(replace(s.scene.rigs[0], body=""),)) for s in samples[:1]]
     with pytest.raises(ConfigError, match="can_bus needs a vehicle that carries 'top'"):
         world.export(NuScenes(can_bus=True), drive_info(world), still, tmp_path)

@@ -10,12 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from gen_data.core.asset_types import SURFACES
-from gen_data.core.errors import ConfigError
 from gen_data.core.sample import EgoTruth, Occupancy, Sample
-from gen_data.core.serialization import canonical_json, from_plain
 from gen_data.exporters.nuscenes import NuScenes
 from gen_data.exporters.occupancy import OccupancyGrids
+from tests.exporters.datasets import made_of
 from tests.exporters.drives import drive_info
+from tests.exporters.label_readers import json_lines
+from tests.survival import assert_survives
 
 LOW_M, VOXEL_M, SHAPE = (0.0, -8.0, -2.4), 0.4, (64, 40, 16)
 EXPORTER = OccupancyGrids(layouts=("occ3d", "surroundocc", "openoccupancy", "semantickitti"))
@@ -23,7 +24,7 @@ CAR, PEDESTRIAN, ROAD, TERRAIN_FREE = 4, 7, 11, 17
 """Classes of Occ3D-nuScenes, from its page."""
 
 
-def gridded(world: Any) -> list[Sample]:
+def gridded(world: Any) -> tuple[Any, list[Sample]]:
     """The drive with the voxels of its boxes in the scanner's frame, on a road 1.7 m below.
 
     The car's inner voxels are interior, as is the land; the camera sees the first half.
@@ -47,17 +48,15 @@ def gridded(world: Any) -> list[Sample]:
         observed = {"left": half, "right": half, "top": state < 2}
         grid = Occupancy(T_world_frame, LOW_M, VOXEL_M, state, ids, surface, observed)
         samples.append(replace(sample, frame=EgoTruth("ego", occupancy=grid)))
-    return samples
+    return drive_info(world), samples
 
 
 @pytest.fixture
 def grids(world: Any) -> list[Sample]:
-    return gridded(world)
+    return gridded(world)[1]
 
 
-@pytest.fixture
-def folder(world: Any, grids: list[Sample], tmp_path: Path) -> Path:
-    return Path(world.export(EXPORTER, drive_info(world), grids, tmp_path))
+folder = made_of(EXPORTER, gridded)
 
 
 def of(sample: Sample) -> Occupancy:
@@ -76,9 +75,9 @@ def unpacked(path: Path) -> NDArray[np.bool_]:
 
 
 def problems(folder: Path, grids: list[Sample]) -> list[str]:
-    """What in the files is not as in the samples."""
+    """Facts in the files that are not as in the samples."""
     found = []
-    rows = [json.loads(line) for line in (folder / "frames.jsonl").read_text().splitlines()]
+    rows = json_lines(folder / "frames.jsonl")
     for sample, row in zip(grids, rows, strict=True):
         grid, scene = of(sample), sample.scene
         stored = np.load(folder / f"grids/{sample.index:09d}.npz")
@@ -112,7 +111,7 @@ def test_grids_are_those_of_the_samples(folder: Path, grids: list[Sample]) -> No
 def test_occ3d_has_nuscenes_classes_under_the_tokens_of_the_nuscenes_export(
     world: Any, folder: Path, grids: list[Sample], tmp_path: Path
 ) -> None:
-    """Truth as prediction has a mean IoU of 1 by Occ3D's formula; classes are those of its page."""
+    """Truth as prediction has a mean IoU of 1 by Occ3D's formula; classes are from its page."""
     nuscenes = world.export(NuScenes(), drive_info(world), world.drive(), tmp_path / "nuscenes")
     tables = nuscenes / "v1.0-mini"
     scenes = {s["token"]: s["name"] for s in json.loads((tables / "scene.json").read_text())}
@@ -121,7 +120,7 @@ def test_occ3d_has_nuscenes_classes_under_the_tokens_of_the_nuscenes_export(
             folder / f"occ3d/gts/{scenes[row['scene_token']]}/{row['token']}/labels.npz"
         ).exists()
 
-    row = json.loads((folder / "frames.jsonl").read_text().splitlines()[0])
+    row = json_lines(folder / "frames.jsonl")[0]
     labels = np.load(folder / f"occ3d/gts/gen-scene-000000/{row['sample_token']}/labels.npz")
     semantics, grid = labels["semantics"], of(grids[0])
     expected = np.full(SHAPE, TERRAIN_FREE)
@@ -132,7 +131,7 @@ def test_occ3d_has_nuscenes_classes_under_the_tokens_of_the_nuscenes_export(
     assert {CAR, PEDESTRIAN, ROAD} < set(semantics.ravel().tolist())
     assert (labels["mask_camera"] == grid.observed["left"]).all()
     assert (labels["mask_lidar"] == grid.observed["top"]).all()
-    # Beside each other the scanner's frame moves at 10 m/s; flow is that of the objects themselves.
+    # The scanner's frame itself moves at 10 m/s; flow is of the objects in the world.
     car = labels["flow"][grid.instance_id == 1].astype(float)
     assert np.linalg.norm(car, axis=1) == pytest.approx(8.0, abs=0.02)
     assert not labels["flow"][grid.instance_id == 0].any()
@@ -189,18 +188,4 @@ def test_scene_completion_has_the_layout_of_semantickitti(
 
 
 def test_annotations_survive_their_line_of_labels(grids: list[Sample]) -> None:
-    grid = of(grids[0])
-    read = from_plain(Occupancy, json.loads(canonical_json(grid)))
-    for name in ("state", "instance_id", "surface"):
-        old, new = getattr(grid, name), getattr(read, name)
-        assert (old == new).all()
-        assert old.dtype == new.dtype
-    assert {k: v.tolist() for k, v in read.observed.items()} == {
-        k: v.tolist() for k, v in grid.observed.items()
-    }
-
-
-@pytest.mark.parametrize("layout", ["semantickitti", "openoccupancy"])
-def test_layouts_of_scans_without_a_scanner_are_refused(layout: Any, world: Any) -> None:
-    with pytest.raises(ConfigError, match=f"layouts: '{layout}' lists scans, but there is no"):
-        OccupancyGrids(layouts=("occ3d", layout)).check(world.info(1))
+    assert_survives(of(grids[0]))

@@ -1,9 +1,8 @@
 """OpenDRIVE files of own streets, read back by the reader of the elements."""
 
-import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gen_data.core.errors import ConfigError
 from gen_data.core.lane_geometry import border_line, left_normals
 from gen_data.core.scene import Lane, Scene
 from gen_data.exporters.opendrive import OpenDrive
@@ -23,8 +21,8 @@ from gen_data.roads.opendrive import Network, Road, Section, read_opendrive
 from gen_data.roads.opendrive_lanes import network_lanes, origin_m
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.road import Road as RoadElement
-from tests.exporters.drives import drive_info
-from tests.exporters.test_nuscenes_expansions import on_streets, streets
+from tests.exporters.label_readers import json_lines
+from tests.exporters.test_nuscenes_expansions import streets, town
 from tests.libraries import library
 from tests.roads.test_turn_lanes import crossing
 
@@ -189,26 +187,15 @@ def crosswalk_corners(root: Any, read: Network) -> Iterator[list[Any]]:
             ]  # fmt: skip
 
 
-def town(world: Any) -> tuple[Any, Sequence[Any]]:
-    return drive_info(world), on_streets(world.drive())
-
-
 def check_files(folder: Path) -> None:
     for path in sorted(folder.glob("*.xodr")):
         assert list(problems(streets(), read_opendrive(path.read_bytes(), path.name), ends=1)) == []
 
 
 def test_every_world_has_a_file_and_every_sample_names_it(world: Any, tmp_path: Path) -> None:
-    info, samples = town(world)
-    folder = world.export(OpenDrive(), info, samples, tmp_path, assets=library())
-    rows = [json.loads(line) for line in (folder / "worlds.jsonl").read_text().splitlines()]
+    folder = world.export(OpenDrive(), *town(world), tmp_path, assets=library())
+    rows = json_lines(folder / "worlds.jsonl")
     assert Counter(row["world"] for row in rows) == {"000000.xodr": 4, "000001.xodr": 4}
     assert [row["index"] for row in rows] == list(range(8))
     assert len(list(folder.glob("*.xodr"))) == 2
     check_files(folder)
-
-
-def test_scenes_without_a_street_are_refused() -> None:
-    with pytest.raises(ConfigError, match=r"opendrive.*no driving lane; add an element 'road'"):
-        OpenDrive().check_scene(Scene("room"))
-    OpenDrive().check_scene(streets())

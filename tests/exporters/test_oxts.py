@@ -37,7 +37,7 @@ def mercator(lat_deg: float, lon_deg: float, scale: float) -> tuple[float, float
 
 
 def test_navigation_follows_the_rig(exported: Any, world: Any) -> None:
-    """Position and heading by the devkit's projection are those of the circle that it drives."""
+    """Position and heading by the devkit's projection are on the circle that it drives."""
     drive = exported(KittiRaw()) / DRIVE.format(0)
     rows = [
         np.array((drive / f"oxts/data/{k:010d}.txt").read_text().split(), float) for k in range(4)

@@ -19,10 +19,13 @@ from tests.exporters import conftest
 from tests.exporters.bent import LENSES, bent_samples, opencv_maps, opencv_matrix
 
 
+def rectified(source: Intrinsics, **fields: Any) -> Rectification:
+    return Rectification(source, rectified_intrinsics(source, Rectify(**fields)))
+
+
 @pytest.fixture(params=sorted(LENSES))
 def bent(request: pytest.FixtureRequest) -> Rectification:
-    source = LENSES[request.param]
-    return Rectification(source, rectified_intrinsics(source, Rectify()))
+    return rectified(LENSES[request.param])
 
 
 def test_maps_and_pictures_are_opencvs_and_show_what_the_original_has(bent: Rectification) -> None:
@@ -49,7 +52,8 @@ def test_maps_and_pictures_are_opencvs_and_show_what_the_original_has(bent: Rect
 def test_the_default_pinhole_and_its_points_are_opencvs_without_empty_pixels() -> None:
     """``alpha=0`` with a centred principal point, whose rectangle is a little too narrow."""
     source = LENSES["brown_conrady"]
-    target = rectified_intrinsics(source, Rectify())
+    bent = rectified(source)
+    target = bent.target
     K, _ = cv2.getOptimalNewCameraMatrix(
         opencv_matrix(source),
         np.array(source.lens.coefficients),
@@ -60,14 +64,13 @@ def test_the_default_pinhole_and_its_points_are_opencvs_without_empty_pixels() -
     np.testing.assert_allclose(opencv_matrix(target), K, rtol=2e-3)
     assert target.fx_px / target.fy_px == pytest.approx(118.0 / 117.0)
     # Keypoints: ``cv2.undistortPoints`` with the new matrix.
-    bent = Rectification(source, rectified_intrinsics(source, Rectify()))
     points = np.array([[20.3, 30.8], [80.0, 60.0], [150.1, 100.9]])
     theirs = cv2.undistortPoints(
         (points - 0.5).reshape(-1, 1, 2),
         opencv_matrix(source),
         np.array(source.lens.coefficients),
         R=np.eye(3),
-        P=opencv_matrix(bent.target),
+        P=opencv_matrix(target),
         criteria=(cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-12),
     )
     np.testing.assert_allclose(bent.points(points) - 0.5, theirs[:, 0], atol=1e-6)
@@ -78,8 +81,7 @@ def test_label_images_are_those_of_a_pinhole_except_at_silhouettes(world: Any, m
     """Against a ray cast of the pinhole; the half pixel of the nearest one changes nothing else."""
     (sample,) = bent_samples(world, model, 1)
     reading = sample.capture.readings["color"]
-    source = reading.camera.intrinsics
-    bent = Rectification(source, rectified_intrinsics(source, Rectify()))
+    bent = rectified(reading.camera.intrinsics)
     pinhole = conftest.ray_cast(sample.scene, replace(reading.camera, intrinsics=bent.target))
     cast = pinhole.channels[Channel.INSTANCE]
     ids = bent.image(Channel.INSTANCE, reading.channels[Channel.INSTANCE])
@@ -103,8 +105,7 @@ def test_annotations_are_those_of_the_rectified_masks(world: Any, model: str) ->
     """Boxes are tight around them; keypoints, shares and poses agree with the pinhole's own."""
     (sample,) = bent_samples(world, model, 1)
     reading, truth = sample.capture.readings["color"], sample.truth["color"]
-    source = reading.camera.intrinsics
-    bent = Rectification(source, rectified_intrinsics(source, Rectify()))
+    bent = rectified(reading.camera.intrinsics)
     again = rectified_truth(truth, sample.scene, bent, Thresholds())
     camera = replace(reading.camera, intrinsics=bent.target)
     cast = conftest.ray_cast(sample.scene, camera)
@@ -133,17 +134,16 @@ def test_annotations_are_those_of_the_rectified_masks(world: Any, model: str) ->
 
 @pytest.mark.parametrize("amodal", [True, False])
 def test_shares_of_objects_that_only_the_rectified_image_cuts(world: Any, amodal: bool) -> None:
-    """A field of 32 degrees cuts things that the original shows whole.
+    """A field of 32 degrees cuts objects that the original shows whole.
 
-    Without amodal masks this holds for things that nothing hides.
+    Without amodal masks this holds for objects that nothing hides.
     """
     (sample,) = bent_samples(world, "brown_conrady", 1)
     truth = sample.truth["color"]
     if not amodal:
         objects = tuple(replace(t, amodal_mask=None) for t in truth.objects)
         truth = replace(truth, objects=objects)
-    source = truth.camera.intrinsics
-    bent = Rectification(source, rectified_intrinsics(source, Rectify(hfov_deg=32.0)))
+    bent = rectified(truth.camera.intrinsics, hfov_deg=32.0)
     again = rectified_truth(truth, sample.scene, bent, Thresholds())
     camera = replace(truth.camera, intrinsics=bent.target)
     cast = {"color": conftest.ray_cast(sample.scene, camera)}
@@ -165,7 +165,7 @@ def test_shares_of_objects_that_only_the_rectified_image_cuts(world: Any, amodal
 
 
 def test_a_panorama_needs_a_stated_field() -> None:
-    """Also a fisheye that sees sideways; what is left of it is what a pinhole at K' sees."""
+    """Also a fisheye that sees sideways; the rest of it is the view of a pinhole at K'."""
     for lens in (Lens("equirectangular"), Lens("kannala_brandt", (0.0, 0.0, 0.0, 0.0))):
         source = Intrinsics.from_hfov(160, 120, np.radians(200.0), lens)
         with pytest.raises(ConfigError, match="wider than 150 degrees; expected rectify: "):
@@ -177,10 +177,9 @@ def test_a_panorama_needs_a_stated_field() -> None:
 def test_the_focal_length_can_be_kept() -> None:
     """Beyond the original there is nothing: black, and no label."""
     source = replace(LENSES["brown_conrady"], lens=Lens("brown_conrady", (0.5, *[0.0] * 7)))
-    target = rectified_intrinsics(source, Rectify(keep_focal=True))
-    assert target == Intrinsics(160, 120, 118.0, 117.0, 81.5, 58.7)
-    bent = Rectification(source, target)
-    u, v = opencv_maps(source, target)
+    bent = rectified(source, keep_focal=True)
+    assert bent.target == Intrinsics(160, 120, 118.0, 117.0, 81.5, 58.7)
+    u, v = opencv_maps(source, bent.target)
     outside = (u < -0.5) | (u >= 159.5) | (v < -0.5) | (v >= 119.5)
     assert 0 < outside.sum() < outside.size
     white = np.full((120, 160, 3), 255, np.uint8)

@@ -7,7 +7,9 @@ import pytest
 from gen_data.core import optional_packages
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Scene
 from gen_data.exporters import TABLE
+from tests.exporters.test_nuscenes_expansions import streets
 
 BENT = {"color": "kannala_brandt"}
 RGB_ONLY = {"media": {"color": (Channel.RGB,)}}
@@ -20,8 +22,8 @@ DRIVE = {"n": 8, "cameras": ("left", "right"), "lidars": ("top",), "steps_per_sc
 LONG = DRIVE | {"n": 40_001}
 TRAFFIC = DRIVE | {"categories": ("bench", "mug")}
 
-PINHOLES = [*("bop", "cityscapes", "kitti", "kitti_raw", "kitti_tracking", "nuscenes", "scannet"),
-            *("semantickitti", "solo", "tum_rgbd")]  # fmt: skip
+PINHOLES = [*("bop", "cityscapes", "kitti", "kitti_raw", "kitti_tracking", "nuscenes", "openlane"),
+            *("scannet", "semantickitti", "solo", "tum_rgbd")]  # fmt: skip
 NO_PHOTOGRAPH = r"no sensor of color writes the rgb channel"
 TOO_LONG = "there are 10001; expected at most 40000 samples"
 NO_DEPTH = "'color' does not write the channel depth; add it .* leave 'depth' out"
@@ -29,6 +31,7 @@ NO_INSTANCES = "'color' does not write the channel instance; add it .* leave 'in
 NO_RANGE = "expected both, with near_m < far_m, or neither"
 
 ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
+    ("argoverse2", {}, {}, "there is no lidar; add a sensor"),
     ("calibration", {}, {"lenses": {"color": "equirectangular"}}, "no camera has a calibration"),
     ("cityscapes", {}, RGB_ONLY, "does not write the channel instance; add it"),
     ("cityscapes", {"right": "other"}, {}, "does not write the channel disparity"),
@@ -69,14 +72,22 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("argoverse2", {}, TRAFFIC, r"no category of the data set has a class .* car, van"),
     ("cityscapes", {"camera": "left"}, TRAFFIC, r"no category of the data set has a class .* car"),
     ("nuscenes", {}, DRIVE | {"cameras": ("CAM_LEFT", "left")}, "'CAM_LEFT' and 'left' both"),
+    ("nuscenes", {"can_bus": True}, DRIVE | {"n": 4 * 8001}, "8000 sequences, .* are 8001"),
+    *(
+        ("occupancy", {"layouts": ("occ3d", k)}, {}, f"layouts: '{k}' lists scans, but there is no")
+        for k in ("semantickitti", "openoccupancy")
+    ),
     ("pointclouds", {}, {}, "add a sensor of that type"),
     ("scannet", {}, RGB_ONLY, "camera 'color' does not write the channel depth"),
+    ("scene_text", {}, {"media": {"color": (Channel.INSTANCE,)}}, NO_PHOTOGRAPH),
     ("semantickitti", {}, {}, "there is no lidar; add a sensor"),
     ("semantickitti", {}, NO_CAMERA, "there is no camera; add a sensor"),
     ("semantickitti", {"camera": "colour"}, SCANNER, "no camera 'colour'.*color"),
     ("semantickitti", {"lidar": "velo"}, SCANNER, "no lidar 'velo'.*top"),
     ("solo", {}, {"steps_per_scene": 4}, "expected a multiple of 4 samples, not 7"),
     ("tables", {}, {"devices": {}}, r"add a sensor such as .*imu"),
+    ("tapvid", {}, DEPTH_ONLY, NO_PHOTOGRAPH),
+    ("tapvid", {}, {"lenses": BENT}, "layouts: 'tapvid3d': camera 'color' has a lens"),
     ("tfrecord", {}, NO_IMAGE, NO_PHOTOGRAPH),
     ("tum_rgbd", {}, RGB_ONLY, "camera 'color' does not write the channel depth"),
     ("tum_rgbd", {"imu": "imo"}, DRIVE, "no IMU 'imo'; expected one of: imu"),
@@ -97,10 +108,41 @@ def test_the_text_names_what_is_missing(
         exporter.check(world.info(**{"n": 7, **facts}))
 
 
-@pytest.mark.parametrize("kind", ["coco", "motchallenge"])
-def test_formats_of_image_boxes_take_any_lens(world: Any, kind: str) -> None:
-    """Boxes and masks are where the lens puts them."""
-    assert TABLE.load(kind)().check(world.info(4, lenses=BENT)) is None
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [("coco", {}), ("culane", {}), ("motchallenge", {}), ("tapvid", {"layouts": ("tapvid",)})],
+)
+def test_formats_of_images_take_any_lens(world: Any, kind: str, options: dict[str, Any]) -> None:
+    """Boxes, masks, lines and points are where the lens puts them."""
+    assert TABLE.load(kind)(**options).check(world.info(4, lenses=BENT)) is None
+
+
+NO_STREET, NO_ARM = "no driving lane; add an element", "the scene has no arm; add an elem"
+ROOM = {
+    **dict.fromkeys(("culane", "map_vectors", "opendrive", "openlane"), NO_STREET),
+    **dict.fromkeys(("lerobot", "rlds"), NO_ARM),
+}
+"""Formats that need more than a bare room, and the message."""
+
+
+@pytest.mark.parametrize("kind", TABLE.names())
+def test_scenes_are_refused_before_anything_is_rendered(kind: str) -> None:
+    """A room, by formats of streets and of arms; all others take it."""
+    exporter = TABLE.load(kind)()
+    if kind not in ROOM:
+        assert exporter.check_scene(Scene("room")) is None
+        return
+    with pytest.raises(ConfigError, match=f"exporter '{kind}'.*: .*{ROOM[kind]}"):
+        exporter.check_scene(Scene("room"))
+
+
+def test_formats_of_streets_take_a_street() -> None:
+    """Also the map of nuScenes, which a room does not have."""
+    expanded = TABLE.load("nuscenes")(map_expansion=True)
+    with pytest.raises(ConfigError, match=r"map_expansion needs a street.*'road'"):
+        expanded.check_scene(Scene("room"))
+    for exporter in (expanded, *(TABLE.load(k)() for k in ("culane", "opendrive", "openlane"))):
+        exporter.check_scene(streets())
 
 
 @pytest.mark.parametrize(

@@ -73,8 +73,8 @@ class Stated:
         within: Patterns of the files that depend on them.
         take: Takes the poses out of a JSON document that also has labels, and returns them; None =
             no labels of these files depend on poses of sensors.
-        own: Whether the data set is that of the exporter contract rather than a drive.
-        fields: Of the exporter.
+        own: Whether the data set is from the exporter contract rather than a drive.
+        fields: Fields of the exporter.
     """
 
     within: tuple[str, ...] = ("*",)

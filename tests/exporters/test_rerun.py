@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +16,23 @@ from gen_data.core.errors import StorageError
 from gen_data.core.interfaces import media_path
 from gen_data.exporters.rerun import Rerun
 from gen_data.exporters.rrd_container import write_recording
-from tests.exporters.datasets import street_in
+from tests.exporters.datasets import made_of
 
 CLI = (sys.executable, "-c", "import sys; from rerun_cli.__main__ import main; sys.exit(main())")
 """The tool ``rerun`` of this environment."""
 Table = dict[str, dict[int, Any]]
-dataset = street_in(Rerun(samples_per_file=3))
+dataset = made_of(Rerun(samples_per_file=3))
 
 
-def tables(path: Path) -> dict[str, Table]:
-    """Values by entity, component and sample; -1 for those without a time."""
+def chunks(*paths: Path) -> Iterator[Any]:
+    for path in paths:
+        yield from rerun.chunk.RrdReader(str(path)).store().stream()
+
+
+def tables(*paths: Path) -> dict[str, Table]:
+    """Values by entity, component and sample; -1 for values without a time."""
     found: dict[str, Table] = {}
-    for chunk in rerun.chunk.RrdReader(str(path)).store().stream():
+    for chunk in chunks(*paths):
         batch = chunk.to_record_batch()
         names = batch.schema.names
         indices = batch["sample"].to_pylist() if "sample" in names else [-1] * batch.num_rows
@@ -38,15 +44,7 @@ def tables(path: Path) -> dict[str, Table]:
 
 
 def problems(root: Path, shards: Path, world: Any) -> list[str]:
-    read: dict[str, Table] = {}
-    for path in sorted(root.glob("*/*.rrd")):
-        try:
-            parts = tables(path)
-        except (ValueError, RuntimeError) as error:
-            return [f"{path.name}: {error}"]
-        for entity, table in parts.items():
-            for name, values in table.items():
-                read.setdefault(entity, {}).setdefault(name, {}).update(values)
+    read = tables(*sorted(root.glob("*/*.rrd")))
     image = "/world/cameras/color/image"
     found = []
     for sample in world.samples:
@@ -118,7 +116,7 @@ def test_scans_and_instants_of_a_drive(exported: Any, samples: Any) -> None:
 def read_times(path: Path) -> dict[int, Any]:
     """Instant of each sample on the timeline ``time``."""
     found = {}
-    for chunk in rerun.chunk.RrdReader(str(path)).store().stream():
+    for chunk in chunks(path):
         if chunk.entity_path == "/world/boxes":
             batch = chunk.to_record_batch()
             found.update(zip(batch["sample"].to_pylist(), batch["time"].to_pylist(), strict=True))

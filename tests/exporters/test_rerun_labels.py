@@ -16,10 +16,11 @@ from gen_data.core.se3 import SE3
 from gen_data.exporters.label_colors import SURFACE_COLORS, UNLABELLED, id_color
 from gen_data.exporters.label_parts import BORDER_COLORS, LIFT_M
 from gen_data.exporters.rerun import Rerun
-from gen_data.preview.rerun_recording import Recorder
+from tests.exporters.datasets import imaging, with_sensor
 from tests.exporters.drives import drive_info
 from tests.exporters.test_delivery import with_record
 from tests.exporters.test_rerun import Table, tables
+from tests.preview.recorded import recorded
 
 VISIBLE, OCCLUDED, OUTSIDE = 0, 2, 3
 MEDIA = (
@@ -64,11 +65,9 @@ def make_mirror(shape: tuple[int, ...], number: int) -> Any:
 
 def labelled(sample: Sample) -> Sample:
     """A sample of the drive with all further labels; the left camera has two layers."""
-    left = sample.capture.readings["left"]
-    depth = left.channels[Channel.Z_DEPTH]
-    ids = left.channels[Channel.INSTANCE]
-    channels = {
-        **left.channels,
+    left = sample.capture.readings["left"].channels
+    depth, ids = left[Channel.Z_DEPTH], left[Channel.INSTANCE]
+    images = {
         Channel.DEPTH_LAYERS: np.stack([np.full_like(depth, 2.5), depth], axis=-1),
         Channel.INSTANCE_LAYERS: np.stack([np.zeros_like(ids), ids], axis=-1),
         Channel.MATERIAL_LAYERS: np.stack([np.full_like(ids, 2), np.zeros_like(ids)], axis=-1),
@@ -81,11 +80,8 @@ def labelled(sample: Sample) -> Sample:
         occupancy=make_grid(sample),
         tracks=make_tracks(sample),
     )
-    readings = {**sample.capture.readings, "left": replace(left, channels=channels)}
     truth = {**sample.truth, "left": replace(sample.truth["left"], borders=(IN_IMAGE,))}
-    return replace(
-        sample, capture=replace(sample.capture, readings=readings), truth=truth, frame=frame
-    )
+    return replace(imaging(sample, "left", images), truth=truth, frame=frame)
 
 
 def info_of(world: Any) -> Any:
@@ -177,7 +173,7 @@ def decoded(table: Table, name: str, index: int) -> Any:
     return cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_UNCHANGED)
 
 
-def test_each_layer_is_an_image_of_its_own(read: dict[str, Table], drive: list[Sample]) -> None:
+def test_each_layer_is_an_image(read: dict[str, Table], drive: list[Sample]) -> None:
     """Depth in units of the data set; ids in their colours."""
     for sample in training(drive):
         k, channels = sample.index, sample.capture.readings["left"].channels
@@ -238,16 +234,9 @@ def test_deliveries_are_numbers_over_time_of_sensors_that_have_such_faults(
     drive = [with_record(s, {"left"}, records.get(s.index, {})) for s in samples]
     late = {"arrived_s": drive[3].capture.clouds["top"].time_s + 0.125}
     drive[3] = with_record(drive[3], {"top"}, late)
-    info = drive_info(world)
-    faulty = {"left": ("lost", "doubled")}
-    sensors = tuple(replace(s, faults=faulty.get(s.name, ())) for s in info.sensors)
-    info = replace(info, sensors=sensors)
+    info = with_sensor(drive_info(world), "left", faults=("lost", "doubled"))
     folder = world.export(Rerun(), info, drive, tmp_path)
-    read: dict[str, Table] = {}
-    for path in sorted(folder.rglob("*.rrd")):
-        for entity, columns in tables(path).items():
-            for name, values in columns.items():
-                read.setdefault(entity, {}).setdefault(name, {}).update(values)
+    read = tables(*sorted(folder.rglob("*.rrd")))
     arrivals = read["/delivery/left/arrivals"]["Scalars:scalars"]
     assert {k: v for k, (v,) in arrivals.items()} == {
         s.index: {1: 0.0, 2: 2.0}.get(s.index, 1.0) for s in samples
@@ -258,32 +247,18 @@ def test_deliveries_are_numbers_over_time_of_sensors_that_have_such_faults(
     assert not any(path.startswith("/delivery/right") for path in read)
 
 
-class _Stream:
-    def __init__(self) -> None:
-        self.logged: dict[str, Any] = {}
-
-    def log(self, path: str, *values: Any, static: bool = False) -> None:
-        self.logged[path] = values[0]
-
-    def set_time(self, *_: object, **__: object) -> None:
-        """Times do not matter here."""
-
-    def send_blueprint(self, blueprint: object) -> None:
-        """Nor does the layout."""
-
-
 def test_recordings_of_exports_and_previews_show_the_same(
     world: Any, read: dict[str, Table], drive: list[Sample]
 ) -> None:
     """Components that the preview logs for lanes, tracks and voxels."""
     scene = replace(drive[0].scene, bodies=(), rigs=(), devices=(), tracks=())
     sample = replace(training(drive)[0], scene=scene)
-    stream = _Stream()
-    Recorder(stream, None, info_of(world)).record(sample)  # type: ignore[arg-type]
+    stream = recorded(sample, info=info_of(world))
     compared = 0
     for path in ("world/lanes", "world/tracks", "world/occupancy/voxels",
                  "world/cameras/left/image/lanes", "world/cameras/left/image/tracks"):  # fmt: skip
-        for batch in stream.logged[path].as_component_batches():
+        (shown,) = stream.at(path)
+        for batch in shown.as_component_batches():
             name = batch.component_descriptor().component
             if name in ("Points2D:class_ids", "Points2D:show_labels"):
                 continue
@@ -291,7 +266,8 @@ def test_recordings_of_exports_and_previews_show_the_same(
             assert read[f"/{path}"][name][sample.index] == values, (path, name)
             compared += 1
     assert compared > 12
-    places = stream.logged["world/mirrored/left"].positions.as_arrow_array().to_pylist()
+    (mirrored,) = stream.at("world/mirrored/left")
+    places = mirrored.positions.as_arrow_array().to_pylist()
     stored = read["/world/mirrored/left"]["Points3D:positions"][sample.index]
     assert np.abs(np.subtract(places, stored)).max() < 0.005  # half a unit of the file
 

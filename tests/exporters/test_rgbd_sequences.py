@@ -7,32 +7,25 @@ from typing import Any
 
 import cv2
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from gen_data.core.capture import Channel
 from gen_data.core.sample import Sample
 from gen_data.exporters.scannet import ScanNet
 from gen_data.exporters.tum_rgbd import TumRgbd
+from tests.exporters.datasets import drive, made_of
+from tests.exporters.label_readers import pixels
 
 NYU40 = {"pedestrian": 31, "crate": 29, "car": 0}
 """Numbers of person and box in NYU's list; it has no cars."""
 
 
-@pytest.fixture(scope="module")
-def tum(exported: Any) -> Path:
-    folder: Path = exported(TumRgbd())
-    return folder
-
-
-@pytest.fixture(scope="module")
-def scannet(exported: Any) -> Path:
-    folder: Path = exported(ScanNet())
-    return folder
+tum = made_of(TumRgbd(), drive)
+scannet = made_of(ScanNet(), drive)
 
 
 def table(path: Path) -> list[list[str]]:
-    """Columns of the lines that are no comments."""
+    """Columns of all lines but comments."""
     return [row.split() for row in path.read_text().splitlines() if not row.startswith("#")]
 
 
@@ -45,7 +38,7 @@ def heights_m(depth_m: Any, pinhole: Sequence[float], pose: Any) -> Any:
 
 
 def assert_on_scene(height_m: Any, depth_m: Any, sample: Sample, depth_step_m: float) -> None:
-    """The ground is at height 0, and things reach from it to the top of their box."""
+    """The ground is at height 0, and objects reach from it to the top of their box."""
     channels = sample.capture.readings["left"].channels
     ids, seen = channels[Channel.INSTANCE], depth_m > 0.0
     margin_m = depth_step_m + 1e-6
@@ -59,10 +52,10 @@ def assert_on_scene(height_m: Any, depth_m: Any, sample: Sample, depth_step_m: f
 
 def read_units(path: Path, units: float) -> Any:
     """Values of a 16-bit image in units, such as metres; 0 = none."""
-    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    assert pixels is not None
-    assert pixels.dtype == np.uint16
-    return pixels / units
+    raw = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert raw is not None
+    assert raw.dtype == np.uint16
+    return raw / units
 
 
 def sequence(samples: Sequence[Sample], number: int) -> Sequence[Sample]:
@@ -70,7 +63,10 @@ def sequence(samples: Sequence[Sample], number: int) -> Sequence[Sample]:
 
 
 def test_tum_points_lie_on_the_scene_and_are_listed(tum: Path, samples: Sequence[Sample]) -> None:
-    """Depth at 5000 units per metre, quaternions with the scalar last, and associated times."""
+    """Depth at 5000 units per metre, quaternions with the scalar last, and associated times.
+
+    In the order of their times; the photographs are as in the data set.
+    """
     for number, split in enumerate(("train", "val")):
         folder = tum / split / f"{number:06d}"
         pinhole = [float(v) for v in table(folder / "calibration.txt")[0]]
@@ -85,21 +81,15 @@ def test_tum_points_lie_on_the_scene_and_are_listed(tum: Path, samples: Sequence
             exact = sample.capture.readings["left"].channels[Channel.Z_DEPTH]
             assert (depth_m[np.isfinite(exact) & (exact < 13.0)] > 0.0).all()
             assert_on_scene(heights_m(depth_m, pinhole, pose), depth_m, sample, 0.0006)
-    # In the order of their times; the photographs are those of the data set.
-    for number, split in enumerate(("train", "val")):
-        folder = tum / split / f"{number:06d}"
         for kind in ("rgb", "depth"):
             rows = table(folder / f"{kind}.txt")
             assert [name for _, name in rows] == [f"{kind}/{time}.png" for time, _ in rows]
             assert {p.name for p in (folder / kind).iterdir()} == {f"{row[0]}.png" for row in rows}
             assert [float(row[0]) for row in rows] == sorted(float(row[0]) for row in rows)
-        for sample, (_, name) in zip(
-            sequence(samples, number), table(folder / "rgb.txt"), strict=True
-        ):
-            read = cv2.imread(str(folder / name))
-            assert read is not None
+        names = [name for _, name in table(folder / "rgb.txt")]
+        for sample, name in zip(sequence(samples, number), names, strict=True):
             rgb = sample.capture.readings["left"].channels[Channel.RGB]
-            assert np.array_equal(read[..., ::-1], rgb)
+            assert np.array_equal(pixels(folder / name), rgb)
 
 
 def test_tum_accelerometer_has_the_readings_of_the_imu(world: Any, tmp_path: Path) -> None:
@@ -152,12 +142,9 @@ def test_scannet_labels_are_nyu40_of_instances_in_scans_listed_by_split(
                 expected[ids == thing.instance_id] = NYU40[thing.category]
             assert np.array_equal(labels, expected)
             assert np.array_equal(instances, np.where(expected > 0, ids, 0))
-    # Every frame has a photograph like that of the data set, in JPEG.
+            # Every frame has the photograph of the data set, in JPEG.
+            read = pixels(folder / f"color/{k}.jpg").astype(float)
+            rgb = sample.capture.readings["left"].channels[Channel.RGB]
+            assert np.abs(read - rgb).mean() < 6.0
     assert (scannet / "scannetv2_train.txt").read_text() == "scene0000_00\n"
     assert (scannet / "scannetv2_val.txt").read_text() == "scene0001_00\n"
-    for number in range(2):
-        for k, sample in enumerate(sequence(samples, number)):
-            read = cv2.imread(str(scan_folder(scannet, number) / f"color/{k}.jpg"))
-            assert read is not None
-            rgb = sample.capture.readings["left"].channels[Channel.RGB]
-            assert np.abs(read[..., ::-1].astype(float) - rgb).mean() < 6.0

@@ -29,7 +29,7 @@ def tight(image: NDArray[np.bool_]) -> MaskPx:
 def test_rle_of_a_crop_is_what_pycocotools_makes_of_the_whole_mask(
     height: int, width: int, density: float, seed: int
 ) -> None:
-    """Small images, so that masks often touch borders, fill columns and span column ends."""
+    """Small images, whose masks often touch borders, fill columns and span column ends."""
     image = np.random.default_rng(seed).random((height, width)) < density
     if not image.any():
         image[-1, -1] = True

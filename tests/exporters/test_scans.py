@@ -1,6 +1,5 @@
 """Laser scans in files: KITTI, SemanticKITTI, PLY and PCD, read back by other means."""
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -25,23 +24,19 @@ from gen_data.exporters.kitti import (
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.pointclouds import PointClouds
 from gen_data.exporters.semantickitti import SemanticKitti
+from tests.exporters.datasets import made_of, scanned_street
 from tests.exporters.drives import calibration, read_ply
+from tests.exporters.label_readers import json_lines
 from tests.wheels import needs_open3d
 
 POINT_FIELDS = [*("x", "y", "z", "intensity", "time", "ring", "instance", "category", "surface"),
                 *("return_number", "return_count")]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def kitti(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    info = world.info(7, lidars=("top",))
-    return world.export(Kitti(far_m=100.0), info, world.samples, tmp_path_factory.mktemp("kitti"))
-
-
-@pytest.fixture(scope="module")
-def semantic(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    info = world.info(7, lidars=("top",))
-    return world.export(SemanticKitti(), info, world.samples, tmp_path_factory.mktemp("semantic"))
+kitti = made_of(Kitti(far_m=100.0), scanned_street)
+semantic = made_of(SemanticKitti(), scanned_street)
+ply = made_of(PointClouds(), scanned_street)
+pcd = made_of(PointClouds(format="pcd"), scanned_street)
 
 
 def bins(path: Path) -> np.ndarray:
@@ -53,13 +48,13 @@ def labels(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return value & 0xFFFF, value >> 16
 
 
-def test_the_native_file_holds_every_field_and_nothing_else(world: Any, tmp_path: Path) -> None:
-    """What was captured is what is read; a missing file is told."""
-    world.export(Kitti(), world.info(7, lidars=("top",)), world.samples, tmp_path)
-    kept = read_points(tmp_path / "shards/000000", "top", 1)
+def test_the_native_file_holds_every_field_and_nothing_else(world: Any, kitti: Path) -> None:
+    """All that was captured is read; a missing file is told."""
+    shard = kitti.parent / "shards/000000"
+    kept = read_points(shard, "top", 1)
     assert kept.tobytes() == world.samples[1].capture.clouds["top"].points.tobytes()
     with pytest.raises(StorageError, match="generate the data set again"):
-        read_points(tmp_path / "shards/000000", "top", 99)
+        read_points(shard, "top", 99)
 
 
 def test_kitti_points_are_the_scanners_with_labels_naming_the_row(kitti: Path, world: Any) -> None:
@@ -173,10 +168,11 @@ def test_semantic_scans_are_in_official_splits_with_classes_and_ids_of_all_scene
 
 @needs_open3d
 @pytest.mark.parametrize("kind", ["ply", "pcd"])
-def test_open3d_reads_point_clouds(kind: str, world: Any, open3d: Any, tmp_path: Path) -> None:
+def test_open3d_reads_point_clouds(
+    kind: str, world: Any, open3d: Any, request: pytest.FixtureRequest
+) -> None:
     """All positions and all scalar fields, as written."""
-    info = world.info(7, lidars=("top",))
-    folder = world.export(PointClouds(format=kind), info, world.samples, tmp_path)
+    folder = request.getfixturevalue(kind)
     points = world.samples[2].capture.clouds["top"].points
     read = open3d.t.io.read_point_cloud(str(folder / f"top/000000002.{kind}"))
     np.testing.assert_array_equal(read.point["positions"].numpy(), points["position_m"])
@@ -184,18 +180,16 @@ def test_open3d_reads_point_clouds(kind: str, world: Any, open3d: Any, tmp_path:
         np.testing.assert_array_equal(read.point[name].numpy()[:, 0], points[field])
 
 
-def test_a_ply_file_is_what_its_header_says_and_points_in_boxes(world: Any, tmp_path: Path) -> None:
+def test_a_ply_file_is_what_its_header_says_and_points_in_boxes(world: Any, ply: Path) -> None:
     """Parsed by hand: one record per point, in the order of the properties."""
-    info = world.info(7, lidars=("top",))
-    folder = world.export(PointClouds(), info, world.samples, tmp_path)
-    records = read_ply(folder / "top/000000000.ply")
+    records = read_ply(ply / "top/000000000.ply")
     points = world.samples[0].capture.clouds["top"].points
     assert list(records.dtype.names) == POINT_FIELDS
     np.testing.assert_array_equal(records["category"], points["category_id"])
     np.testing.assert_array_equal(records["instance"], points["instance_id"])
     np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])
     # ``poses.jsonl`` lists boxes; every labelled point is in its own, to a millimetre.
-    rows = [json.loads(line) for line in (folder / "top/poses.jsonl").read_text().splitlines()]
+    rows = json_lines(ply / "top/poses.jsonl")
     assert [row["index"] for row in rows] == list(range(7))
     checked = 0
     for row, sample in zip(rows, world.samples, strict=True):
@@ -210,11 +204,9 @@ def test_a_ply_file_is_what_its_header_says_and_points_in_boxes(world: Any, tmp_
     assert checked > 100
 
 
-def test_a_pcd_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
+def test_a_pcd_file_is_what_its_header_says(world: Any, pcd: Path) -> None:
     """Parsed by hand by PCL's description: sizes, types and number of points."""
-    info = world.info(7, lidars=("top",))
-    folder = world.export(PointClouds(format="pcd"), info, world.samples, tmp_path)
-    header, body = (folder / "top/000000000.pcd").read_bytes().split(b"DATA binary\n", 1)
+    header, body = (pcd / "top/000000000.pcd").read_bytes().split(b"DATA binary\n", 1)
     lines = dict(line.split(" ", 1) for line in header.decode("ascii").splitlines())
     kinds = zip(lines["TYPE"].lower().split(), lines["SIZE"].split(), strict=True)
     points = world.samples[0].capture.clouds["top"].points

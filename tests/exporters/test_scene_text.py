@@ -13,9 +13,9 @@ import pytest
 from shapely.geometry import Polygon
 
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.sample import CharacterTruth, Sample, TextTruth, WordTruth
-from gen_data.exporters.scene_text import SceneText
+from gen_data.exporters.scene_text import SceneText, outline, region
+from tests.exporters.datasets import made_of
 
 LINE = re.compile(r"^\s*" + r"(-?[0-9]+)\s*,\s*" * 8 + r"(.*)$")
 """A line of ground truth, as ICDAR's evaluation takes it apart."""
@@ -84,10 +84,7 @@ def texts(world: Any) -> tuple[Any, list[Sample]]:
     return world.info(7), written(world)
 
 
-@pytest.fixture(scope="module")
-def folder(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made: Path = world.export(SceneText(), *texts(world), tmp_path_factory.mktemp("scene_text"))
-    return made
+folder = made_of(SceneText(), texts)
 
 
 def icdar(folder: Path) -> Iterator[tuple[int, Path, list[tuple[Any, str]]]]:
@@ -113,7 +110,7 @@ def icdar(folder: Path) -> Iterator[tuple[int, Path, list[tuple[Any, str]]]]:
 
 
 def problems(folder: Path, samples: Any) -> None:
-    """Words and photographs are those of the samples."""
+    """Words and photographs are as in the samples."""
     seen = list(icdar(folder))
     assert len(seen) == len(samples)
     for sample in samples:
@@ -201,8 +198,6 @@ def test_a_bent_word_has_an_outline_along_its_characters_and_a_hidden_part_has_n
     bent = replace(word("ARCH", 0, 0), characters=tuple(
         CharacterTruth(c, quad(8 * k, (0, -3, -3, 0)[k], 8, 12, (-3, 0, 0, 3)[k]), 1.0)
         for k, c in enumerate("ARCH")))  # fmt: skip
-    from gen_data.exporters.scene_text import outline, region
-
     points = outline(bent)
     assert len(points) == 16 and Polygon(points).is_valid
     whole = Polygon(points)
@@ -211,9 +206,3 @@ def test_a_bent_word_has_an_outline_along_its_characters_and_a_hidden_part_has_n
     # Of HALF the first two characters.
     half = Polygon(np.reshape(first[3]["mask"], (-1, 2)))
     assert half.bounds == (80.0, 70.0, 96.0, 82.0)
-
-
-def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
-    info = world.info(1, media={"color": (Channel.INSTANCE,)})
-    with pytest.raises(ConfigError, match="exporter 'scene_text': no sensor of color writes"):
-        SceneText().check(info)

@@ -27,7 +27,7 @@ from tests.exporters.drives import DRIVE, drive_info, stems
 
 @pytest.mark.slow
 def test_sensors_that_miss_a_step_have_no_files(world: Any, slow: Any, tmp_path: Path) -> None:
-    """In raw drives: the numbers of the frames stay, times are those of the files."""
+    """In raw drives: the numbers of the frames stay, times are of the files."""
     exporter = KittiRaw(image_03="right")
     drive = world.export(exporter, drive_info(world), slow, tmp_path) / DRIVE.format(1)
     assert stems(drive / "image_02/data") == [f"{k:010d}" for k in range(4)]
@@ -51,7 +51,7 @@ def test_frames_are_numbered_by_the_formats_camera(world: Any, slow: Any, tmp_pa
 
 
 def test_a_sequence_ends_at_a_gap(world: Any, tmp_path: Path) -> None:
-    """Trackers take frames of one sequence as neighbours; what follows has a number after all."""
+    """Trackers take frames of one sequence as neighbours; the rest has the last number."""
     info, kept = drive_info(world), [s for s in world.drive() if s.index not in {1, 7}]
     mot = world.export(MotChallenge(), info, kept, tmp_path / "m")
     tracking = world.export(KittiTracking(), info, kept, tmp_path / "t") / "training"
@@ -84,7 +84,7 @@ def test_every_second_frame_is_half_the_rate(exporter: Any, world: Any, tmp_path
     "exporter", [Coco(), Kitti(camera="right"), SemanticKitti(), PointClouds(), Kitti()]
 )
 def test_formats_may_lack_readings(exporter: Any, world: Any, slow: Any, tmp_path: Path) -> None:
-    """Files are those of the steps that were read, and no others."""
+    """There are files of the steps that were read, and no others."""
     folder = world.export(exporter, drive_info(world), slow, tmp_path)
     even = ["000000", "000002", "000004", "000006"]
     if exporter.type == "coco":

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.solo import Solo
-from tests.exporters.datasets import street_in
+from tests.exporters.datasets import made_of
 
 SIGNS = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), -1).reshape(-1, 3)
 
@@ -121,7 +121,7 @@ def wrong_colors(folder: Path, flat: Any, instances: Any, labels: Any) -> Iterat
             yield f"label of {box.instanceId}"
 
 
-dataset = street_in(Solo())
+dataset = made_of(Solo())
 
 
 def of_split(world: Any, split: str) -> list[Any]:
@@ -137,7 +137,7 @@ def test_frames_show_the_street(dataset: Path, world: Any, split: str) -> None:
 
 @pytest.mark.slow
 def test_the_official_converter_makes_coco_of_it(dataset: Path, world: Any, tmp_path: Path) -> None:
-    """Boxes of SOLO2COCOConverter are those of the samples."""
+    """Boxes of SOLO2COCOConverter are as in the samples."""
     from pysolotools.consumers import Solo as Reader
     from pysolotools.converters.solo2coco import SOLO2COCOConverter
 

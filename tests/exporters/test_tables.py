@@ -18,7 +18,7 @@ IMU = SensorInfo("imu", Modality.DEVICE, "imu", columns=Imu.columns)
 
 
 def test_csv_holds_every_digit_that_counts_by_sequence(world: Any, tmp_path: Path) -> None:
-    """What is read back is what was measured, row by row, with the index of its sample."""
+    """All that was measured is read back, row by row, with the index of its sample."""
     folder = world.export(Tables(), world.info(7, steps_per_scene=2), world.samples, tmp_path)
     with (folder / "imu/000001.csv").open(encoding="ascii", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -44,7 +44,7 @@ def test_numpy_files_hold_the_same_rows(world: Any, tmp_path: Path) -> None:
 
 
 def test_columns_and_poses_are_told(world: Any, tmp_path: Path) -> None:
-    """What each column means, and where the device was."""
+    """The meaning of each column, and the place of the device."""
     folder = world.export(Tables(), world.info(7), world.samples, tmp_path)
     columns = json.loads((folder / "columns.json").read_text())["imu"]
     poses = [json.loads(line) for line in (folder / "imu/poses.jsonl").read_text().splitlines()]

@@ -1,7 +1,6 @@
 """Point tracks on disk, read and scored by the formulas of TAP-Vid and TAPVid-3D."""
 
 import io
-import json
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -13,18 +12,18 @@ import pytest
 from numpy.typing import NDArray
 
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.sample import TRACK_STATES, EgoTruth, PointTracks, Sample, SensorTracks
-from gen_data.core.serialization import canonical_json, from_plain
 from gen_data.exporters.tapvid import TapVid
+from tests.exporters.datasets import made_of
 from tests.exporters.drives import drive_info
+from tests.survival import assert_survives
 
 VISIBLE, GLASS, OCCLUDED, OUTSIDE, BEHIND = range(len(TRACK_STATES))
 PLACES = np.array([[1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1], [0, 0, 1]]) * 0.5
 """Of the points on each box, in shares of its size from the middle of its foot."""
 
 
-def tracked(world: Any) -> list[Sample]:
+def tracked(world: Any) -> tuple[Any, list[Sample]]:
     """The drive with five points on each box and one at the back of the cameras.
 
     By turns a point is visible, behind a pane or hidden; one of each box is never seen.
@@ -44,7 +43,7 @@ def tracked(world: Any) -> list[Sample]:
         }
         tracks = PointTracks(ids.astype(np.uint16), p_world.astype(np.float32), sensors)
         samples.append(replace(sample, frame=EgoTruth("ego", tracks=tracks)))
-    return samples
+    return drive_info(world), samples
 
 
 def seen_by(camera: Any, p_world: NDArray[np.float64], step: int) -> SensorTracks:
@@ -65,12 +64,10 @@ def seen_by(camera: Any, p_world: NDArray[np.float64], step: int) -> SensorTrack
 
 @pytest.fixture
 def tracks(world: Any) -> list[Sample]:
-    return tracked(world)
+    return tracked(world)[1]
 
 
-@pytest.fixture
-def folder(world: Any, tracks: list[Sample], tmp_path: Path) -> Path:
-    return Path(world.export(TapVid(), drive_info(world), tracks, tmp_path))
+folder = made_of(TapVid(), tracked)
 
 
 def of(sample: Sample, camera: str) -> SensorTracks:
@@ -230,30 +227,4 @@ def test_pickles_name_nothing_but_the_public_constructor_of_arrays(folder: Path)
 
 
 def test_annotations_survive_their_line_of_labels(tracks: list[Sample]) -> None:
-    frame = tracks[0].frame
-    assert frame is not None
-    read = from_plain(EgoTruth, json.loads(canonical_json(frame)))
-    assert read.tracks is not None
-    assert frame.tracks is not None
-    for name, seen in frame.tracks.sensors.items():
-        again = read.tracks.sensors[name]
-        for field in ("position_m", "image_px", "state", "hidden_by"):
-            old, new = getattr(seen, field), getattr(again, field)
-            assert np.array_equal(old, new, equal_nan=old.dtype.kind == "f")
-            assert old.dtype == new.dtype
-    assert np.array_equal(read.tracks.instance_id, frame.tracks.instance_id)
-
-
-def test_bent_lenses_are_refused_by_tapvid_3d_alone(world: Any) -> None:
-    info = world.info(4, lenses={"color": "kannala_brandt"})
-    TapVid(layouts=("tapvid",)).check(info)
-    with pytest.raises(
-        ConfigError, match=r"^exporter 'tapvid': layouts: 'tapvid3d': camera 'color' has a lens"
-    ):
-        TapVid().check(info)
-
-
-def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
-    info = world.info(4, media={"color": (Channel.Z_DEPTH,)})
-    with pytest.raises(ConfigError, match="no sensor of color writes the rgb channel"):
-        TapVid().check(info)
+    assert_survives(tracks[0].frame)

@@ -8,14 +8,14 @@ import crc32c
 
 from gen_data.exporters import tfrecord
 from gen_data.exporters.tfrecord import TfRecord, encode_features, frame_record, label_map
-from tests.exporters.datasets import street_in
+from tests.exporters.datasets import made_of
 from tests.exporters.label_readers import features, records
 
-dataset = street_in(TfRecord(rows_per_file=2, masks="png"))
+dataset = made_of(TfRecord(rows_per_file=2, masks="png"))
 
 
 def sums_are_right(path: Path) -> bool:
-    """Whether both sums of every record are those of crc32c, masked."""
+    """Whether both sums of every record are as crc32c has them, masked."""
     data, position = path.read_bytes(), 0
     while position < len(data):
         (size,) = struct.unpack_from("<Q", data, position)

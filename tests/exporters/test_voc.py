@@ -8,10 +8,10 @@ from PIL import Image
 
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.voc import YEAR, Voc
-from tests.exporters.datasets import street_in
+from tests.exporters.datasets import made_of
 from tests.exporters.label_readers import voc_objects
 
-dataset = street_in(Voc())
+dataset = made_of(Voc())
 
 
 def test_palette_and_label_map_are_the_kits_and_images_the_photographs(dataset: Path) -> None:
@@ -67,7 +67,7 @@ def test_truncated_and_occluded_follow_the_guidelines(world: Any, dataset: Path)
 
 
 def test_ignored_objects_are_difficult_and_void(world: Any, tmp_path: Path) -> None:
-    """They come last, so that the others are numbered without gaps."""
+    """They come last: the others are numbered without gaps."""
     sample = world.samples[0]
     first, *others = sample.truth["color"].objects
     folder = world.export(Voc(images="png"), world.info(1), [world.ignoring(sample)], tmp_path)

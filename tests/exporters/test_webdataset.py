@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from gen_data.core.capture import POINT, Channel
 from gen_data.exporters.webdataset import WebDataset
-from tests.exporters.datasets import street_in
+from tests.exporters.datasets import made_of, scanned_street
 from tests.exporters.label_readers import tar_samples
 
-dataset = street_in(WebDataset(samples_per_tar=2), lidars=("top",))
+dataset = made_of(WebDataset(samples_per_tar=2), scanned_street)
 
 
 def same_columns(matrix: NDArray[Any], columns: list[str], truth: Any) -> bool:
@@ -54,7 +54,7 @@ def faults(folder: Path, world: Any) -> list[str]:
 def test_samples_are_read_back_with_all_fields_by_hugging_face_too(
     dataset: Path, world: Any
 ) -> None:
-    """Images, scans, rows and labels under one key; splits have folders of their own."""
+    """Images, scans, rows and labels under one key; each split has a folder."""
     assert faults(dataset / "train", world) == []
     assert faults(dataset / "val", world) == []
     assert sorted(p.name for p in (dataset / "train").iterdir()) == [

@@ -12,20 +12,23 @@ import yaml
 from PIL import Image
 
 from gen_data.exporters.yolo import Yolo, inner_rectangle
+from tests.exporters.datasets import made_of
 from tests.exporters.label_readers import drawn
 from tests.exporters.test_labels import divided, truth_of
 
 TASKS = ("detect", "segment", "pose", "obb")
 
 
+def with_parts(world: Any) -> tuple[Any, list[Any]]:
+    return world.info(8), [*world.samples, divided(world)]
+
+
 @pytest.fixture(scope="module")
 def samples(world: Any) -> list[Any]:
-    return [*world.samples, divided(world)]
+    return with_parts(world)[1]
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, samples: list[Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return world.export(Yolo(tasks=TASKS), world.info(8), samples, tmp_path_factory.mktemp("yolo"))
+dataset = made_of(Yolo(tasks=TASKS), with_parts)
 
 
 def rows_of(task_folder: Path, split: str, stem: str) -> list[list[float]]:
@@ -50,7 +53,7 @@ def test_segments_are_outlines_of_the_mask(dataset: Path, samples: list[Any], wo
         filled = cv2.fillPoly(np.zeros((h, w), np.uint8), [points.astype(np.int32)], 1)
         count, *_ = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
         parts = max(parts, count - 1)
-        # A line between parts may round to pixels of its own.
+        # A line between parts may round to further pixels.
         for picture in (drawn([points.ravel().tolist()], h, w), filled.astype(bool)):
             assert (picture != mask).sum() <= (0 if count == 2 else 60)
         np.testing.assert_allclose(np.abs(points - np.rint(points)), 0.02, atol=1e-4)

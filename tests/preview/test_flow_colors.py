@@ -6,15 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.core.capture import Capture, Channel, SensorReading
+from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.sample import ImageTruth, Sample
-from gen_data.core.scene import Camera, Scene
+from gen_data.core.scene import Camera
 from gen_data.core.se3 import IDENTITY
 from gen_data.preview.overlay import channel_image
 from gen_data.preview.palette import color_flow
-from gen_data.preview.rerun_recording import Recorder
+from tests.preview.recorded import photograph, recorded
 
 
 def color_of_flow(u: float, v: float) -> tuple[int, int, int]:
@@ -27,7 +26,7 @@ def color_of_flow(u: float, v: float) -> tuple[int, int, int]:
 
 
 def test_what_stands_still_is_white_and_the_saturation_is_the_length() -> None:
-    """The middle of the wheel; and what is not on it."""
+    """The middle of the wheel; and flow that is not on it."""
     assert color_of_flow(0.0, 0.0) == (255, 255, 255)
     assert color_of_flow(math.nan, math.nan) == (0, 0, 0)
     assert (color_of_flow(5.0, 0.0), color_of_flow(20.0, 0.0)) == ((255, 127, 127), (191, 0, 0))
@@ -61,34 +60,15 @@ def test_every_channel_of_flow_can_be_looked_at(channel: Channel, depth: int) ->
     assert image.max() == 255
 
 
-class _Stream:
-    def __init__(self) -> None:
-        self.logged: dict[str, object] = {}
-
-    def log(self, path: str, *what: object, static: bool = False) -> None:
-        self.logged[path] = what
-
-    def set_time(self, *what: object, **when: object) -> None:
-        """Times do not matter here."""
-
-    def send_blueprint(self, blueprint: object) -> None:
-        self.blueprint = blueprint
-
-
 def test_a_recording_has_flow_beside_the_image_of_its_camera() -> None:
-    """As a picture in a tab of its own; a camera without flow has no tabs."""
+    """As a picture in a tab; a camera without flow has no tabs."""
     camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
-    reading = SensorReading("c", camera, {Channel.FLOW_FORWARD: np.ones((4, 6, 2), np.float32)})
+    taken = photograph({Channel.FLOW_FORWARD: np.ones((4, 6, 2), np.float32)}, camera)
     sensor = SensorInfo("c", Modality.CAMERA, channels=(Channel.RGB, Channel.FLOW_FORWARD))
-    info = DatasetInfo("t", 1, 1, 1, (), (sensor,))
-    stream = _Stream()
-    recorder = Recorder(stream, None, info)  # type: ignore[arg-type]
-    truth = {"c": ImageTruth(camera, ())}
-    recorder.start()
-    recorder.record(Sample(0, 0, 0, "train", Scene("t"), Capture({"c": reading}), truth))
-    assert "channels/c/flow_forward" in stream.logged
-    (root,) = [stream.blueprint.root_container]
-    (tabs,) = root.contents[1].contents
+    stream = recorded(taken, info=DatasetInfo("t", 1, 1, 1, (), (sensor,)))
+    assert stream.at("channels/c/flow_forward")
+    (blueprint,) = stream.blueprints
+    (tabs,) = blueprint.root_container.contents[1].contents
     assert [view.origin for view in tabs.contents] == [
         "world/cameras/c/image",
         "channels/c/flow_forward",

@@ -1,22 +1,17 @@
 """Borders of lanes on contact sheets and in Rerun."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from gen_data.core.capture import Capture, Channel, SensorReading
-from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.capture import Channel
 from gen_data.core.lane_geometry import LaneBorder
-from gen_data.core.sample import BorderTruth, EgoTruth, ImageTruth, Sample
-from gen_data.core.scene import Camera, Scene
-from gen_data.core.se3 import SE3
+from gen_data.core.sample import BorderTruth, EgoTruth, Sample
 from gen_data.exporters.label_parts import BORDER_COLORS, HIDDEN, LIFT_M, split_border
 from gen_data.preview.contact_sheet import make_tiles
-from gen_data.preview.rerun_recording import Recorder
-from tests.preview.test_track_views import _Stream
+from tests.preview.recorded import photograph, recorded
 
-CAMERA = Camera("color", SE3(), Intrinsics(80, 60, 50.0, 50.0, 40.0, 30.0))
 PATH = "world/cameras/color/image/lanes"
 PLACES = ((10.5, 50.5), (10.5, 40.5), (10.5, 30.5), (10.5, 20.5), (10.5, 10.5))
 HALF_HIDDEN = BorderTruth("a:left", "lane", PLACES, (True, True, False, False, True))
@@ -29,13 +24,8 @@ WORLD = (
 
 def sample(index: int = 0, world: tuple[LaneBorder, ...] | None = WORLD) -> Sample:
     """A border of which the middle is hidden, and an edge, in a grey image."""
-    grey = {Channel.RGB: np.full((60, 80, 3), 90, np.uint8)}
     borders = None if world is None else (HALF_HIDDEN, EDGE)
-    return Sample(
-        index, 0, 0, "train", Scene("s", cameras=(CAMERA,)),
-        Capture({"color": SensorReading("color", CAMERA, grey)}),
-        {"color": ImageTruth(CAMERA, (), borders=borders)}, frame=EgoTruth(borders=world),
-    )  # fmt: skip
+    return replace(photograph(borders=borders), index=index, frame=EgoTruth(borders=world))
 
 
 def test_a_border_is_split_where_it_disappears() -> None:
@@ -61,39 +51,31 @@ def test_sheets_show_borders_in_the_colours_of_their_kinds_and_hidden_parts_dark
 
 def test_rerun_has_borders_in_the_world_and_their_visible_and_hidden_parts_in_the_image() -> None:
     """Strips in the world are just above the ground."""
-    stream = _Stream()
-    recorder = Recorder(stream, None, DatasetInfo("t", 1, 1, 1, (), ()))  # type: ignore[arg-type]
-    recorder.record(sample())
-    (world,) = stream.logged["world/lanes"]
-    strips = np.array(world.strips.as_arrow_array().to_pylist())  # type: ignore[attr-defined]
+    stream = recorded(sample())
+    (world,) = stream.at("world/lanes")
+    strips = np.array(world.strips.as_arrow_array().to_pylist())
     np.testing.assert_allclose(strips, [np.add(b.points_m, (0, 0, LIFT_M)) for b in WORLD])
     assert colors_of(world) == [BORDER_COLORS["lane"], BORDER_COLORS["edge"]]
 
-    (image,) = stream.logged[PATH]
-    lines = image.strips.as_arrow_array().to_pylist()  # type: ignore[attr-defined]
+    (image,) = stream.at(PATH)
+    lines = image.strips.as_arrow_array().to_pylist()
     parts = [PLACES[:2], PLACES[1:], EDGE.points_px]
     assert lines == [[list(place) for place in part] for part in parts]
     dark = tuple(round(HIDDEN * value) for value in BORDER_COLORS["lane"])
     assert colors_of(image) == [BORDER_COLORS["lane"], dark, BORDER_COLORS["edge"]]
-    assert image.radii.as_arrow_array().to_pylist() == [-1.5, -0.75, -1.5]  # type: ignore[attr-defined]
+    assert image.radii.as_arrow_array().to_pylist() == [-1.5, -0.75, -1.5]
 
 
-def colors_of(strips: object) -> list[tuple[int, ...]]:
+def colors_of(strips: Any) -> list[tuple[int, ...]]:
     """Colours without their alpha, which is 255."""
-    packed = strips.colors.as_arrow_array().to_pylist()  # type: ignore[attr-defined]
+    packed = strips.colors.as_arrow_array().to_pylist()
     assert all(color & 255 == 255 for color in packed)
     return [(color >> 24, color >> 16 & 255, color >> 8 & 255) for color in packed]
 
 
 def test_rerun_gets_lanes_of_the_world_once_per_scene_and_none_without_the_annotation() -> None:
-    stream = _Stream()
-    recorder = Recorder(stream, None, DatasetInfo("t", 1, 1, 1, (), ()))  # type: ignore[arg-type]
-    recorder.record(sample(0, world=None))
-    assert not {"world/lanes", PATH} & set(stream.logged)
-    recorder.record(sample(1))
-    stream.logged.clear()
-    recorder.record(sample(2))
-    assert "world/lanes" not in stream.logged
-    recorder.record(sample(3, world=WORLD[:1]))
-    (world,) = stream.logged["world/lanes"]
-    assert len(world.strips.as_arrow_array()) == 1  # type: ignore[attr-defined]
+    without = sample(0, world=None)
+    assert not recorded(without).at("world/lanes") + recorded(without).at(PATH)
+    stream = recorded(without, sample(1), sample(2), sample(3, world=WORLD[:1]))
+    assert [len(world.strips.as_arrow_array()) for world in stream.at("world/lanes")] == [2, 1]
+    assert len(stream.at(PATH)) == 3

@@ -1,4 +1,4 @@
-"""What is drawn lies where the labels say."""
+"""Drawings lie where the labels are."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,13 +8,13 @@ import pytest
 
 from gen_data.core.asset_types import Keypoint, Material, MeshData
 from gen_data.core.boxes import BoxPx, OrientedBox
-from gen_data.core.capture import POINT, Capture, Channel, PointCloud, SensorReading
+from gen_data.core.capture import POINT, Capture, Channel, PointCloud
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.core.motion import Trajectory
-from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
+from gen_data.core.sample import KeypointTruth, ObjectTruth, Sample
 from gen_data.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.core.se3 import IDENTITY, SE3, look_at
@@ -23,8 +23,8 @@ from gen_data.exporters.label_colors import color_ids, id_color
 from gen_data.preview.contact_sheet import GAP_PX, arrange_tiles
 from gen_data.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
 from gen_data.preview.palette import color_depth, color_shares
-from gen_data.preview.rerun_recording import Recorder
 from gen_data.preview.sensor_views import ROW_PX, point_colors, range_view, top_view
+from tests.preview.recorded import Stream, photograph, recorded
 
 
 def test_boxes_are_drawn_at_their_projection_and_not_behind_the_camera() -> None:
@@ -40,7 +40,7 @@ def test_boxes_are_drawn_at_their_projection_and_not_behind_the_camera() -> None
     rows, columns = np.nonzero(image[..., 0] > 128)
     assert (rows.min(), rows.max()) == (40, 80)
     assert (columns.min(), columns.max()) == (40, 80)
-    # What is behind is not mirrored into the image.
+    # A box behind is not mirrored into the image.
     intrinsics = Intrinsics(64, 64, 60.0, 60.0, 32.0, 32.0)
     image = np.zeros((64, 64, 3), np.uint8)
     draw_box3d(image, OrientedBox(SE3((0.0, 0.0, -3.0)), (1.0, 1.0, 1.0)), intrinsics, (9, 9, 9))
@@ -65,29 +65,6 @@ def test_a_skeleton_is_drawn_at_its_points_and_hidden_ones_are_rings() -> None:
     assert not red[:12].any()
 
 
-class _Stream:
-    """Keeps what is logged, in order, and when."""
-
-    def __init__(self) -> None:
-        self.logged: list[tuple[str, Any]] = []
-        self.seconds: list[tuple[str, float | None]] = []
-        self.blueprints: list[Any] = []
-        self._time_s: float | None = None
-
-    def log(self, path: str, what: Any, *more: Any, static: bool = False) -> None:
-        self.logged.append((path, what))
-        self.seconds.append((path, self._time_s))
-
-    def set_time(
-        self, timeline: str, *, sequence: int | None = None, duration: float | None = None
-    ) -> None:
-        if timeline == "time":
-            self._time_s = duration
-
-    def send_blueprint(self, blueprint: Any) -> None:
-        self.blueprints.append(blueprint)
-
-
 def _info(**changes: Any) -> DatasetInfo:
     about = DatasetInfo("street", 1, 1, 1, ("car",), (SensorInfo("color", Modality.CAMERA),))
     return replace(about, **changes)
@@ -97,34 +74,28 @@ def test_a_recording_joins_the_keypoints_of_each_object_by_itself() -> None:
     """An entity per person; ids by the place in COCO's list; points outside the image left out."""
     camera = Camera("color", IDENTITY, Intrinsics(40, 40, 40.0, 40.0, 20.0, 20.0))
     points = (Keypoint("left_ankle", (0.0, 0.0, 2.0)), Keypoint("nose", (0.0, -9.0, 2.0)))
-    truth = ImageTruth(
-        camera,
-        tuple(
-            ObjectTruth(
-                Instance(k, f"person/{k}", "person", 1, "person", keypoints=points),
-                visible_px=9,
-                box=BoxPx(0, 0, 9, 9),
-                keypoints=(
-                    KeypointTruth("left_ankle", (0.0, 0.0, 2.0), (20.0, 20.0), 2),
-                    KeypointTruth("nose", (0.0, -9.0, 2.0)),
-                ),
-            )
-            for k in (4, 7)
-        ),
+    people = tuple(
+        ObjectTruth(
+            Instance(k, f"person/{k}", "person", 1, "person", keypoints=points),
+            visible_px=9,
+            box=BoxPx(0, 0, 9, 9),
+            keypoints=(
+                KeypointTruth("left_ankle", (0.0, 0.0, 2.0), (20.0, 20.0), 2),
+                KeypointTruth("nose", (0.0, -9.0, 2.0)),
+            ),
+        )
+        for k in (4, 7)
     )
-    scene = Scene("street", instances=tuple(item.instance for item in truth.objects))
-    capture = Capture({"color": SensorReading("color", camera, {})})
-    stream = _Stream()
-    recorder = Recorder(stream, None, _info(categories=("person",)))  # type: ignore[arg-type]
-    recorder.start()
-    recorder.record(Sample(0, 0, 0, "train", scene, capture, {"color": truth}))
+    scene = Scene("street", instances=tuple(item.instance for item in people))
+    taken = replace(photograph({}, camera, objects=people), scene=scene)
+    stream = recorded(taken, info=_info(categories=("person",)))
     prefix = "world/cameras/color/image/keypoints"
-    logged = [(path, what) for path, what in stream.logged if path.startswith(prefix)]
+    logged = [(path, value) for path, value, _ in stream.logged if path.startswith(prefix)]
     assert [path for path, _ in logged] == [prefix, f"{prefix}/4", f"{prefix}/7"]
-    for _, what in logged[1:]:
-        assert what.keypoint_ids.as_arrow_array().to_pylist() == [PERSON.names.index("left_ankle")]
-        assert what.class_ids.as_arrow_array().to_pylist() == [1]
-    contexts = [what for path, what in stream.logged if path == "/"]
+    for _, value in logged[1:]:
+        assert value.keypoint_ids.as_arrow_array().to_pylist() == [PERSON.names.index("left_ankle")]
+        assert value.class_ids.as_arrow_array().to_pylist() == [1]
+    contexts = stream.at("/")
     (described,) = contexts[-1].context.as_arrow_array().to_pylist()
     bones = described[1]["class_description"]["keypoint_connections"]
     assert len(contexts) == 2
@@ -150,29 +121,16 @@ def test_images_that_rerun_cannot_place_in_space_are_shown_by_themselves() -> No
     """A pinhole is logged for a pinhole only."""
     for lens, pinholes in ((Lens(), 1), (Lens("equirectangular"), 0)):
         camera = Camera("color", IDENTITY, Intrinsics(8, 4, 1.3, 1.3, 4.0, 2.0, lens))
-        reading = SensorReading("color", camera, {})
-        stream = _Stream()
-        recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
-        truth = {"color": ImageTruth(camera, ())}
-        sample = Sample(0, 0, 0, "train", Scene("s"), Capture({"color": reading}), truth)
-        recorder.start()
-        recorder.record(sample)
-        logged = [what for path, what in stream.logged if path == "world/cameras/color/image"]
-        assert len(logged) == pinholes
+        stream = recorded(photograph({}, camera), info=_info())
+        assert len(stream.at("world/cameras/color/image")) == pinholes
 
 
 def test_the_scene_opens_where_the_first_camera_is() -> None:
     """Inside a closed room, just before the camera's image; sent with the first sample."""
     pose = look_at((1.0, 2.0, 1.5), (1.0, 6.0, 1.5))
     camera = Camera("color", pose, Intrinsics(8, 4, 8.0, 8.0, 4.0, 2.0))
-    capture = Capture({"color": SensorReading("color", camera, {})})
-    stream = _Stream()
-    recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
-    recorder.start()
-    for index in (0, 1):
-        truth = {"color": ImageTruth(camera, ())}
-        recorder.record(Sample(index, 0, 0, "train", Scene("s"), capture, truth))
-    (blueprint,) = stream.blueprints
+    taken = photograph({}, camera)
+    (blueprint,) = recorded(taken, replace(taken, index=1), info=_info()).blueprints
     world = blueprint.root_container.contents[0]
     eye = world.properties["EyeControls3D"]
     (at,), (to,), (up,) = (
@@ -200,12 +158,8 @@ def test_every_channel_of_a_camera_is_in_the_recording() -> None:
         Channel.DEPTH_LAYERS: np.stack([depth_m, depth_m + 1.0], axis=-1),
         Channel.INSTANCE_LAYERS: np.stack([ids, ids + 1, 0 * ids], axis=-1),
     }
-    stream = _Stream()
-    recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
-    capture = Capture({"color": SensorReading("color", camera, channels)})
-    truth = {"color": ImageTruth(camera, ())}
-    recorder.record(Sample(0, 0, 0, "train", Scene("s"), capture, truth))
-    logged = {path for path, _ in stream.logged}
+    stream = recorded(photograph(channels, camera), info=_info())
+    logged = {path for path, *_ in stream.logged}
     for name in ("rgb", "depth", "measured_depth", "depth_layers/0", "depth_layers/1"):
         assert f"world/cameras/color/image/{name}" in logged
     layers = [f"instance_layers/{k}" for k in range(3)]
@@ -285,7 +239,7 @@ class _Triangles:
 
 
 def _moving(step_index: int, *, first: int = 0) -> Sample:
-    """An ego car that drives 1 m per step beside a house; frames 0.1 s apart."""
+    """An ego car that drives 1 m per step past a house; frames 0.1 s apart."""
     knots = tuple(SE3((float(k), 0.0, 0.0)) for k in range(4))
     scene = Scene(
         "street",
@@ -298,31 +252,26 @@ def _moving(step_index: int, *, first: int = 0) -> Sample:
     return Sample(index, 0, 0, "train", shown, Capture({}), {}, step_index=step_index)
 
 
-def _recorded(samples: list[Sample]) -> _Stream:
-    stream = _Stream()
-    recorder = Recorder(stream, _Triangles(), _info(steps_per_scene=4))  # type: ignore[arg-type]
-    for sample in samples:
-        recorder.record(sample)
-    return stream
+def _driven(*samples: Sample) -> Stream:
+    return recorded(*samples, info=_info(steps_per_scene=4), assets=_Triangles())
 
 
 def test_sequences_follow_each_other_and_send_meshes_once_and_ways() -> None:
     """The house is sent once, the car's mesh once and its place at each of three steps."""
-    logged = _recorded([_moving(k) for k in range(3)]).logged
+    stream = _driven(*(_moving(k) for k in range(3)))
 
     def count(path: str, kind: str) -> int:
-        return sum(p == path and type(what).__name__ == kind for p, what in logged)
+        return [type(value).__name__ for value in stream.at(path)].count(kind)
 
     assert [count("world/bodies/house", k) for k in ("Mesh3D", "Transform3D")] == [1, 1]
     assert [count("world/bodies/ego", k) for k in ("Mesh3D", "Transform3D")] == [1, 3]
     assert count("world/rigs/ego", "Transform3D") == 3
     # 3 m ahead from the first step, logged once; it is lifted off the ground.
-    logged = _recorded([_moving(k) for k in range(3)]).logged
-    (way,) = [what for path, what in logged if path == "world/ways"]
+    (way,) = stream.at("world/ways")
     (strip,) = way.strips.as_arrow_array().to_pylist()
     assert strip[0] == pytest.approx([0.0, 0.0, 0.05])
     assert strip[-1] == pytest.approx([3.0, 0.0, 0.05])
     # Four steps of 0.1 s make a sequence of 0.4 s; the second begins where the first ended.
-    stream = _recorded([_moving(2), _moving(0, first=4)])
-    seconds = dict.fromkeys(s for path, s in stream.seconds if path == "world/rigs/ego")
+    stream = _driven(_moving(2), _moving(0, first=4))
+    seconds = dict.fromkeys(s for path, _, s in stream.logged if path == "world/rigs/ego")
     assert list(seconds) == pytest.approx([0.2, 0.4])

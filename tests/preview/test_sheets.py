@@ -1,4 +1,4 @@
-"""Sheets of sensors: what is on them, and those of the documentation."""
+"""Sheets of sensors: their contents, and the sheets of the documentation."""
 
 import re
 from dataclasses import replace

@@ -2,18 +2,12 @@
 
 import numpy as np
 
-from gen_data.core.capture import Capture, Channel, SensorReading
-from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.sample import CharacterTruth, ImageTruth, Sample, TextTruth, WordTruth
-from gen_data.core.scene import Camera, Scene
-from gen_data.core.se3 import SE3
+from gen_data.core.capture import Channel
+from gen_data.core.sample import CharacterTruth, Sample, TextTruth, WordTruth
 from gen_data.preview.contact_sheet import make_tiles
-from gen_data.preview.rerun_recording import Recorder
 from gen_data.preview.text_view import READABLE, UNREADABLE
-from tests.preview.test_track_views import _Stream
+from tests.preview.recorded import photograph, recorded
 
-CAMERA = Camera("color", SE3(), Intrinsics(80, 60, 50.0, 50.0, 40.0, 30.0))
 LEFT = ((10.5, 10.5), (30.5, 10.5), (30.5, 20.5), (10.5, 20.5))
 RIGHT = ((30.5, 10.5), (50.5, 10.5), (50.5, 20.5), (30.5, 20.5))
 LOW = ((10.5, 40.5), (50.5, 40.5), (50.5, 50.5), (10.5, 50.5))
@@ -27,11 +21,8 @@ def word(text: str, quad: object, shares: tuple[float, ...], *, readable: bool) 
 
 
 def sample(*words: WordTruth) -> Sample:
-    grey = {Channel.RGB: np.full((60, 80, 3), 90, np.uint8)}
     text = TextTruth("AB", "zxx", "print", BOTH, "sign", 1, 1.0, True, words)
-    truth = ImageTruth(CAMERA, (), texts=(text,))
-    capture = Capture({"color": SensorReading("color", CAMERA, grey)})
-    return Sample(0, 0, 0, "train", Scene("s", cameras=(CAMERA,)), capture, {"color": truth})
+    return photograph(texts=(text,))
 
 
 def drawn(*words: WordTruth, labels: bool = True) -> np.ndarray:
@@ -64,11 +55,9 @@ def test_of_a_word_that_is_hidden_in_part_the_visible_characters_are_outlined() 
 
 
 def test_rerun_has_visible_words_with_their_text() -> None:
-    stream = _Stream()
-    recorder = Recorder(stream, None, DatasetInfo("t", 1, 1, 1, (), ()))  # type: ignore[arg-type]
     hidden = word("I", LOW, (0.0,), readable=False)
-    recorder.record(sample(word("AB", BOTH, (1.0, 1.0), readable=True), hidden))
-    (words,) = stream.logged["world/cameras/color/image/texts"]
-    strips = words.strips.as_arrow_array().to_pylist()  # type: ignore[attr-defined]
+    stream = recorded(sample(word("AB", BOTH, (1.0, 1.0), readable=True), hidden))
+    (words,) = stream.at("world/cameras/color/image/texts")
+    strips = words.strips.as_arrow_array().to_pylist()
     assert strips == [[list(place) for place in (*BOTH, BOTH[0])]]
-    assert words.labels.as_arrow_array().to_pylist() == ["AB"]  # type: ignore[attr-defined]
+    assert words.labels.as_arrow_array().to_pylist() == ["AB"]

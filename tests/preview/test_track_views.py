@@ -1,18 +1,15 @@
 """Tracked points on contact sheets and in Rerun."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from gen_data.core.capture import Capture, Channel, SensorReading
-from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.sample import EgoTruth, ImageTruth, PointTracks, Sample, SensorTracks
-from gen_data.core.scene import Camera, Scene
-from gen_data.core.se3 import SE3
+from gen_data.core.capture import Channel
+from gen_data.core.sample import EgoTruth, PointTracks, Sample, SensorTracks
 from gen_data.exporters.label_colors import id_color
 from gen_data.preview.contact_sheet import make_tiles
-from gen_data.preview.rerun_recording import Recorder
+from tests.preview.recorded import photograph, recorded
 
-CAMERA = Camera("color", SE3(), Intrinsics(80, 60, 50.0, 50.0, 40.0, 30.0))
 VISIBLE, OCCLUDED, OUTSIDE = 0, 2, 3
 
 
@@ -23,16 +20,11 @@ def sample(step: int, u: float = 20.5) -> Sample:
     seen = SensorTracks(np.ones((3, 3), np.float32), places, state, np.zeros(3, np.uint16))
     p_world = np.arange(9, dtype=np.float32).reshape(3, 3)
     tracks = PointTracks(np.zeros(3, np.uint16), p_world, {"color": seen})
-    grey = {Channel.RGB: np.full((60, 80, 3), 90, np.uint8)}
-    reading = SensorReading("color", CAMERA, grey)
-    return Sample(
-        step, 0, 0, "train", Scene("s", cameras=(CAMERA,)), Capture({"color": reading}),
-        {"color": ImageTruth(CAMERA, ())}, step_index=step, frame=EgoTruth(tracks=tracks),
-    )  # fmt: skip
+    return replace(photograph(), index=step, step_index=step, frame=EgoTruth(tracks=tracks))
 
 
 def test_visible_points_are_filled_hidden_ones_rings_and_ways_lead_back() -> None:
-    """Points are in the colours of their numbers; what is outside is not drawn."""
+    """Points are in the colours of their numbers; points outside are not drawn."""
     channels = {"color": (Channel.RGB,)}
     first, second = (t.image for t in make_tiles([sample(0), sample(1)], channels, labels=True))
     one, two = (np.array(id_color(k)) for k in (1, 2))
@@ -45,29 +37,10 @@ def test_visible_points_are_filled_hidden_ones_rings_and_ways_lead_back() -> Non
     assert (second[:12] == 90).all()
 
 
-class _Stream:
-    def __init__(self) -> None:
-        self.logged: dict[str, tuple[object, ...]] = {}
-
-    def log(self, path: str, *values: object, static: bool = False) -> None:
-        self.logged[path] = values
-
-    def set_time(self, *_: object, **__: object) -> None:
-        """Times do not matter here."""
-
-    def send_blueprint(self, blueprint: object) -> None:
-        """Nor does the layout."""
-
-
 def test_rerun_has_the_points_in_the_world_and_in_the_image() -> None:
-    stream = _Stream()
-    Recorder(stream, None, DatasetInfo("t", 1, 1, 1, (), ())).record(sample(0))  # type: ignore[arg-type]
-    (world,) = stream.logged["world/tracks"]
-    assert world.positions.as_arrow_array().to_pylist() == [  # type: ignore[attr-defined]
-        [0, 1, 2], [3, 4, 5], [6, 7, 8],
-    ]  # fmt: skip
-    (image,) = stream.logged["world/cameras/color/image/tracks"]
-    assert image.positions.as_arrow_array().to_pylist() == [  # type: ignore[attr-defined]
-        [20.5, 20.5], [40.5, 45.5],
-    ]  # fmt: skip
-    assert image.radii.as_arrow_array().to_pylist() == [-3.0, -1.5]  # type: ignore[attr-defined]
+    stream = recorded(sample(0))
+    (world,) = stream.at("world/tracks")
+    assert world.positions.as_arrow_array().to_pylist() == [[0, 1, 2], [3, 4, 5], [6, 7, 8]]
+    (image,) = stream.at("world/cameras/color/image/tracks")
+    assert image.positions.as_arrow_array().to_pylist() == [[20.5, 20.5], [40.5, 45.5]]
+    assert image.radii.as_arrow_array().to_pylist() == [-3.0, -1.5]

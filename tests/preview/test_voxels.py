@@ -10,7 +10,7 @@ from gen_data.core.scene import Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters.label_colors import SURFACE_COLORS, id_color
 from gen_data.preview.contact_sheet import make_tiles
-from gen_data.preview.rerun_recording import Recorder
+from tests.preview.recorded import recorded
 
 CAR = Instance(5, "car/5", "car", 2, "car")
 
@@ -42,28 +42,12 @@ def test_voxels_are_drawn_in_the_colour_of_their_class_and_darker_where_nobody_s
     assert (dark.image.any(axis=-1) == tile.image.any(axis=-1)).mean() > 0.99
 
 
-class _Stream:
-    def __init__(self) -> None:
-        self.logged: dict[str, tuple[object, ...]] = {}
-
-    def log(self, path: str, *values: object, static: bool = False) -> None:
-        self.logged[path] = values
-
-    def set_time(self, *_: object, **__: object) -> None:
-        """Times do not matter here."""
-
-    def send_blueprint(self, blueprint: object) -> None:
-        """Nor does the layout."""
-
-
 def test_rerun_has_a_box_for_each_voxel_with_a_surface_in_the_frame_of_the_grid() -> None:
-    stream = _Stream()
-    info = DatasetInfo("t", 1, 1, 1, ("person", "car"), ())
-    Recorder(stream, None, info).record(sample())  # type: ignore[arg-type]
-    (pose,) = stream.logged["world/occupancy"]
-    (boxes,) = stream.logged["world/occupancy/voxels"]
-    assert pose.translation.as_arrow_array().to_pylist() == [[3.0, 0.0, 0.0]]  # type: ignore[attr-defined]
-    centers = np.array(boxes.centers.as_arrow_array().to_pylist())  # type: ignore[attr-defined]
+    stream = recorded(sample(), info=DatasetInfo("t", 1, 1, 1, ("person", "car"), ()))
+    (pose,) = stream.at("world/occupancy")
+    (boxes,) = stream.at("world/occupancy/voxels")
+    assert pose.translation.as_arrow_array().to_pylist() == [[3.0, 0.0, 0.0]]
+    centers = np.array(boxes.centers.as_arrow_array().to_pylist())
     assert len(centers) == 20 * 10 + 4 * 2
     assert centers.min(axis=0).tolist() == [0.5, -4.5, 0.5]
     assert centers.max(axis=0).tolist() == [19.5, 4.5, 1.5]

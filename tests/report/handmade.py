@@ -51,7 +51,7 @@ def make_object(number: int, category: str, x_px: int = 20, side_px: int = 8) ->
     x_m = 3.0 * (x_px + 0.5 * side_px - lens.cx_px) / lens.fx_px
     y_m = 3.0 * (20 + 0.5 * side_px - lens.cy_px) / lens.fy_px
     side_m = 3.0 * (side_px + 2) / lens.fx_px
-    # Turned by pi about X, so that Z points back to the camera.
+    # Turned by pi about X: Z points back to the camera.
     pose = SE3((x_m, y_m, 3.0), (0.0, 1.0, 0.0, 0.0))
     return ObjectTruth(
         instance,

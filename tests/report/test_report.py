@@ -73,7 +73,7 @@ def test_cocos_files_are_read_an_object_at_a_time_and_histograms_lose_nothing(st
     )
     assert (labels[3].kind, labels[3].occlusion_level) == ("Person_sitting", 2)
     assert [r for r in found if isinstance(r, Points)] == [Points("person", (1, 1, 2))]
-    # What is beyond the last edge is in the last bin.
+    # Values beyond the last edge are in the last bin.
     found = collect_statistics(read_records(street))
     found.numbers[("car", "Car")].extend([5000.0, 4000.0, 0, 0, 1, 999.0, 4, 2, 1])
     made = report_tables.make_histograms(found)
@@ -94,7 +94,7 @@ def test_diversity_counts_variants_and_what_was_not_annotated_is_blank() -> None
     assert table.rows == (("car", "all", "6", "4", "1.92"), ("car", "car", "4", "3", "1.50"))
     survey = collect_statistics([Label(("train", "1"), "Car", "Car", 9, 9)])
     assert "Diversity" not in {one.title for one in report_tables.make_tables(survey)}
-    # A data set of boxes only has sizes still; without its types KITTI is no match.
+    # A data set of boxes only has sizes still; without its types KITTI does not match.
     made = report_tables.make_tables(
         collect_statistics([Picture("train", "1"), Label(("train", "1"), "mug", "Misc", 10, 20)])
     )
@@ -108,7 +108,7 @@ def test_diversity_counts_variants_and_what_was_not_annotated_is_blank() -> None
 
 
 def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
-    """Pixels are inclusive; DontCare is no object; h w l become l w h."""
+    """Pixels are inclusive; DontCare is not an object; h w l become l w h."""
     labels = tmp_path / "kitti/training/label_2"
     labels.mkdir(parents=True)
     (tmp_path / "kitti/ImageSets").mkdir()

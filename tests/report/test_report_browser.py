@@ -89,7 +89,7 @@ def test_the_page_fits_a_phone(opened: Opened) -> None:
 
 
 def test_the_policy_blocks_other_scripts_and_requests(opened: Opened, tmp_path: Path) -> None:
-    """Names of a hostile data set are shown as text, and what is added to the file does not run."""
+    """Hostile names are shown as text, and scripts that are added to the file do not run."""
     image = make_image(np.random.default_rng(4))
     hostile = write_dataset(
         tmp_path / "set", [[make_object(1, HOSTILE_NAME)]], (HOSTILE_NAME,), [image]

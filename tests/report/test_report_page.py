@@ -176,18 +176,22 @@ DAMAGE: dict[str, Callable[[ObjectTruth], ObjectTruth]] = {
 }
 
 
-@pytest.mark.parametrize("title", CHECKS)
-def test_each_check_finds_its_contradiction_and_no_other(tmp_path: Path, title: str) -> None:
-    """One damaged object beside an intact one."""
-    good = make_object(2, "car")
-    damaged = DAMAGE[title](make_object(1, "car"))
-    image = np.zeros((48, 64, 3), np.uint8)
-    folder = write_dataset(tmp_path / "set", [[damaged, good]], ("car",), [image])
+def contradictions(folder: Path, *objects: ObjectTruth) -> list[Any]:
+    """Checks that find something in a data set of one image."""
+    write_dataset(folder, [objects], ("car",), [np.zeros((48, 64, 3), np.uint8)])
     checks = LabelChecks()
     for labels in read_images(StoredSamples(folder)):
         checks.add(labels)
-    assert {r.title: r.found for r in checks.results if r.found} == {title: 1}
-    (finding,) = next(r.examples for r in checks.results if r.found)
+    return [result for result in checks.results if result.found]
+
+
+@pytest.mark.parametrize("title", CHECKS)
+def test_each_check_finds_its_contradiction_and_no_other(tmp_path: Path, title: str) -> None:
+    """One damaged object next to an intact one."""
+    damaged = DAMAGE[title](make_object(1, "car"))
+    (result,) = contradictions(tmp_path / "set", damaged, make_object(2, "car"))
+    assert (result.title, result.found) == (title, 1)
+    (finding,) = result.examples
     assert (finding.index, finding.instance_id) == (0, 1)
 
 
@@ -207,15 +211,9 @@ def test_mirrors_may_exceed_the_3d_box(tmp_path: Path) -> None:
     narrow = replace(thing.box3d_camera, size_m=(side_m, 0.3 * side_m, side_m))
     labelled = replace(thing, instance=whole, box3d_camera=narrow)
     too_small = replace(labelled, instance=replace(whole, box_max_m=(0.0, *half[1:])))
-    findings = []
-    for name, item in (("good", labelled), ("bad", too_small)):
-        checks = LabelChecks()
-        image = np.zeros((48, 64, 3), np.uint8)
-        folder = write_dataset(tmp_path / name, [[item]], ("car",), [image])
-        for labels in read_images(StoredSamples(folder)):
-            checks.add(labels)
-        findings.append({r.title for r in checks.results if r.found})
-    assert findings == [set(), {"2D box exceeds the projected 3D box"}]
+    assert contradictions(tmp_path / "good", labelled) == []
+    (result,) = contradictions(tmp_path / "bad", too_small)
+    assert result.title == "2D box exceeds the projected 3D box"
 
 
 def test_all_pairs_of_near_hashes_are_found_but_of_one_scene_or_another_content() -> None:
@@ -255,7 +253,7 @@ def test_images_are_spread_evenly(count: int) -> None:
 
 
 def test_the_page_of_a_data_set_is_in_its_run_folder(hand: Path) -> None:
-    """The figures are beside it; a second data set is shown in the same page."""
+    """The figures are in the same folder; a second data set is shown in the same page."""
     done = CliRunner().invoke(report, [str(hand), "--compare", str(hand), "--scenes", "0"])
     assert done.exit_code == 0, done.output
     folder = hand / "run/report"

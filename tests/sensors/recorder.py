@@ -1,4 +1,4 @@
-"""A renderer that remembers what it was asked for."""
+"""A renderer that remembers the channels it was asked for."""
 
 from typing import Any
 

@@ -70,7 +70,7 @@ def world(
     step_s: float = 0.1,
     seconds: float = 4.0,
 ) -> Scene:
-    """An ego car with a rig at its origin, at 10 m/s along X, and what is around it."""
+    """An ego car with a rig at its origin, at 10 m/s along X, and the world around it."""
     ego = ego or straight((0.0, 0.0), (10.0, 0.0))
     things = [thing(1, "ego", "car", ego(0.0)), *others]
     return scene_time.add_twists(
@@ -91,7 +91,7 @@ def rng(step: int = 0, seed: int = 0, name: str = "sensor/device") -> streams.Rn
 
 
 def reading(sensor: Instrument, scene: Scene, step: int = 0, seed: int = 0) -> Measurements:
-    """What a device reports at one step of a sequence."""
+    """The reading of a device at one step of a sequence."""
     mounted = scene_time.place_sensors(sensor.mount(scene))
     then = scene_time.add_twists(scene_time.scene_at(mounted, step * scene.step_s))
     return sensor.capture(then, BoxRays(), frozenset(), rng(step, seed))

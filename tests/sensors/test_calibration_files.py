@@ -60,12 +60,12 @@ def project_cv(D: Array, *, fisheye: bool = False, matrix: Array = K) -> Array:
 
 
 def assert_projects(found: Intrinsics, expected_px: Array) -> None:
-    """OpenCV's pixel coordinates plus a half are those of this project, to 1e-6 px."""
+    """Pixel coordinates are OpenCV's plus a half, to 1e-6 px."""
     np.testing.assert_allclose(found.project(POINTS_M), expected_px + 0.5, atol=1e-6)
 
 
 def cv_text(ending: str, folder: Path, values: Mapping[str, Any]) -> str:
-    """What OpenCV's own writer makes of values."""
+    """Values in a file, by OpenCV's own writer."""
     path = folder / f"written{ending}"
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     for key, value in values.items():
@@ -301,7 +301,7 @@ def test_images_of_unknown_size_are_refused(tmp_path: Path, size: str, fact: str
 def test_numbers_of_larger_images_than_the_cameras_are_pointed_out(
     tmp_path: Path, size: str
 ) -> None:
-    """A camera without a size has 640 x 480 pixels; with that of the calibration all is well."""
+    """A camera without a size has 640 x 480 pixels, which is wrong if the calibration has more."""
     numbers = "intrinsics: {fx_px: 1400, fy_px: 1400, cx_px: 960, cy_px: 540%s}"
     fact = r"mine\.yaml:3:.*sensors\[0\]\.intrinsics: the principal point \(960, 540\) is far from"
     with pytest.warns(ConfigWarning, match=fact):
@@ -485,7 +485,7 @@ def test_a_kalibr_chain_places_cameras_from_the_imu(tmp_path: Path) -> None:
 
 
 def test_a_pair_of_opencv_is_placed_by_r_and_t(tmp_path: Path) -> None:
-    """``stereoCalibrate``: points of camera 2 are R times those of 1, plus T; here in mm."""
+    """``stereoCalibrate``: points of camera 2 are R times points of 1, plus T; here in mm."""
     R, _ = cv2.Rodrigues(np.array([0.01, -0.02, 0.03]))
     T = np.array([[-60.0], [0.5], [1.5]])
     more = {"M1": K, "D1": D5, "M2": K, "D2": D5, "R": R, "T": T}
@@ -677,7 +677,7 @@ def rpy_matrix(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
 
 
 def test_a_camera_on_a_hand_is_where_the_links_of_its_robot_have_it(tmp_path: Path) -> None:
-    """The rig on a wrist has X out of the hand, the link Z: the camera is where the URDF says."""
+    """The rig on a wrist has X out of the hand, the link Z: the camera is at the place in the URDF."""
     (tmp_path / "assets.yaml").write_text(
         "robots: [{id: arm, file: arm.urdf, gripper: {link: hand, finger_joints: [], "
         "grasp_offset_m: 0.1, stroke_m: 0.08}}]\n"

@@ -76,7 +76,7 @@ def read(device: DepthModel, *bodies: Body, seed: int = 0) -> SensorReading:
 
 
 def measured(device: DepthModel, *bodies: Body) -> tuple[np.ndarray, np.ndarray]:
-    """What it reports and the truth, [h, w]."""
+    """Its reading and the truth, [h, w]."""
     reading = read(device, *bodies)
     return reading.channels[Channel.MEASURED_DEPTH], reading.channels[Channel.Z_DEPTH]
 
@@ -150,7 +150,7 @@ def test_a_lens_that_is_no_pinhole_is_refused() -> None:
 def test_axial_noise_is_that_of_nguyen_and_others(z_m: float, sigma_m: float) -> None:
     """0.0012 + 0.0019 (z - 0.4)^2, quantisation included; to 6 %.
 
-    With 1/32 px of a focal length of 173 px steps are nearly those of a Kinect.
+    With 1/32 px of a focal length of 173 px steps are nearly as of a Kinect.
     """
     device = model("structured_light", step_px=0.03125)
     seen_m, true_m = measured(device, board("wall", z_m))
@@ -263,7 +263,7 @@ def test_phases_that_belong_to_no_distance_disagree() -> None:
 
 @pytest.mark.parametrize("flying", [True, False])
 def test_pixels_fly_only_at_edges_and_only_with_a_footprint(flying: bool) -> None:
-    """Depths between a board at 0.9 m and a wall at 1.5 m occur beside the board's edges alone."""
+    """Depths between a board at 0.9 m and a wall at 1.5 m occur at the board's edges alone."""
     sure = {**SINGLE, "electrons": 1e6, "full_well": 1e8, "flying": flying}
     seen_m, true_m = measured(
         model("time_of_flight", **sure), board("board", 0.9), board("wall", 1.5)
@@ -324,7 +324,7 @@ def test_matching_finds_projected_dots_to_a_tenth_of_a_pixel(z_m: float, lean_ra
 
 
 def test_a_blank_wall_needs_the_projector() -> None:
-    """Without dots hardly a match is right."""
+    """Without dots few matches are right."""
     lit, blank = (
         disparity_error_px(model("active_stereo", projector_cd=cd), board("wall", 0.6))
         for cd in (70.0, 0.0)
@@ -369,8 +369,8 @@ def stereo(
 def test_a_camera_of_a_pair_tells_disparities() -> None:
     """``f b / z`` everywhere.
 
-    Not visible are a strip of the wall beside the board and one at the image's left rim, as wide as
-    the disparities say.
+    Not visible are a strip of the wall next to the board and one at the image's left rim, as wide
+    as the disparities differ.
     """
     channels = stereo().channels
     disparity, visible = channels[Channel.DISPARITY], channels[Channel.DISPARITY_VISIBLE]
@@ -385,7 +385,7 @@ def test_a_camera_of_a_pair_tells_disparities() -> None:
 
 
 def test_cameras_that_are_no_pair_are_told_why() -> None:
-    """Names, the fact and what to do."""
+    """Names, the fact and the remedy."""
     with pytest.raises(SampleError, match=r"'left' and 'right' are not a rectified pair: .*rig"):
         stereo((0.1, 0.02, 0.0))
     with pytest.raises(ConfigError, match=r"there is no camera 'rihgt'.*did you mean 'right'"):

@@ -30,7 +30,7 @@ QUIET = {"leak_hz": 0.0, "shot_noise_hz": 0.0, "refractory_s": 0.0, "size_px": S
 
 
 class Film(BoxRays):
-    """A renderer whose every pixel has the luminance that a function of time says [cd/m^2]."""
+    """A renderer whose every pixel has the luminance of a function of time [cd/m^2]."""
 
     def __init__(self, luminance: Callable[[float], float]) -> None:
         self.luminance = luminance

@@ -1,4 +1,4 @@
-"""What happens to an ego car, against arithmetic."""
+"""Events of an ego car, against arithmetic."""
 
 import math
 from typing import Any
@@ -65,7 +65,7 @@ def test_collision_is_noticed_once(others: Things, tracks: list, expected: Any) 
 
 
 def test_crown_of_a_tree_is_no_wall() -> None:
-    """Its stem is what one collides with."""
+    """One collides with its stem."""
     crown = ((-4.0, -4.0, 0.0), (4.0, 4.0, 9.0))
     aside, ahead = (thing(5, "tree", "tree", SE3((9.0, y, 0.0)), crown) for y in (2.0, 0.0))
 
@@ -110,7 +110,7 @@ def test_lines_of_junctions_do_not_count() -> None:
 
 
 def test_obstacle_is_the_nearest_thing_in_the_way() -> None:
-    """A person in the car's path, nearer than the wall; one beside the path does not count."""
+    """A person in the car's path, nearer than the wall; one aside does not count."""
     others = [
         thing(2, "beside", "person", SE3((6.0, 1.3, 0.0)), PERSON_M),
         thing(3, "ahead", "person", SE3((9.0, 0.9, 0.0)), PERSON_M),
@@ -131,11 +131,12 @@ def test_obstacle_that_only_reaches_into_the_way_counts_from_where_it_does() -> 
     assert gap_ahead_m(own, its, 0.0) == pytest.approx(12.0 - 0.9 - 2.2, abs=5e-3)
 
 
-def test_far_obstacles_are_not_reported() -> None:
-    scene = world(others=[thing(4, "wall", "building", SE3((40.0, 0.0, 0.0)), WALL_M)])
+@pytest.mark.parametrize(("reach_m", "count"), [(30.0, 0), (40.0, 1)])
+def test_far_obstacles_are_not_reported(reach_m: float, count: int) -> None:
+    wall = thing(4, "wall", "building", SE3((40.0, 0.0, 0.0)), WALL_M)
+    rows = reading(EventDetector(obstacle_m=reach_m), world(others=[wall]), 0).rows
 
-    assert len(of_kind(reading(EventDetector(obstacle_m=30.0), scene, 0).rows, "obstacle")) == 0
-    assert len(of_kind(reading(EventDetector(obstacle_m=40.0), scene, 0).rows, "obstacle")) == 1
+    assert len(of_kind(rows, "obstacle")) == count
 
 
 def test_what_lies_flat_on_the_road_is_no_obstacle() -> None:
@@ -181,7 +182,7 @@ def test_light_far_ahead_does_not_matter_yet(step: int, count: int) -> None:
 
 
 def test_slow_watcher_reports_all_since_its_last_reading() -> None:
-    """At 2 Hz in steps of 0.1 s: what happened at 1.2 s is told at 1.5 s."""
+    """At 2 Hz in steps of 0.1 s: a collision at 1.2 s is told at 1.5 s."""
     rows = reading(EventDetector(rate_hz=2.0), world(others=[WALL]), 15).rows
 
     assert of_kind(rows, "collision")["time_s"].tolist() == pytest.approx([1.2], abs=0.0101)

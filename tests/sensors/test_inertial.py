@@ -86,7 +86,7 @@ def test_bias_walks_on_from_step_to_step() -> None:
 
 
 def test_walk_grows_with_the_root_of_time() -> None:
-    """A unit whose walk is all there is: after 100 readings ten times that of one."""
+    """A unit whose only error is a walk: after 100 readings it is ten times the first."""
     scene, sensor = still(20.0), Imu(model="ADIS16448", rate_hz=10)
 
     def force(step: int, seed: int) -> float:
@@ -201,7 +201,7 @@ def ideal_odometer(**fields: float) -> Odometer:
 
 
 def test_ideal_odometer_on_a_circle() -> None:
-    """20 m, 8 m/s: way, yaw rate, steering angle and wheels are those of the Ackermann geometry."""
+    """20 m, 8 m/s: way, yaw rate, steering angle and wheels follow the Ackermann geometry."""
     rows = readings(ideal_odometer(wheelbase_m=2.7, track_m=1.6), world(circle(20.0, 8.0)), 11)
     last = rows[-1]
 
@@ -236,7 +236,7 @@ def test_scale_error_stays_through_a_sequence() -> None:
 
 
 def test_unused_walls_leave_inertial_readings_alone() -> None:
-    """What stands around changes no inertial reading."""
+    """Objects around it change no inertial reading."""
     walled = world(others=[thing(9, "wall", "building", SE3((30.0, 0.0, 0.0)), WALL_M)])
 
     assert reading(Imu(), walled, 3).rows.tobytes() == reading(Imu(), world(), 3).rows.tobytes()

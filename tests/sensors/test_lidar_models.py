@@ -96,7 +96,7 @@ def test_azimuths_turn_clockwise_evenly_and_lasers_of_an_os1_are_staggered() -> 
 
 
 def test_a_rosette_fills_its_round_view_and_never_repeats() -> None:
-    """Within 19.2 degrees of its axis; the next sweep shares hardly any direction."""
+    """Within 19.2 degrees of its axis; the next sweep shares few directions."""
     model = lidar_model("livox")
     one, next_ = make_sweep(model, 10.0), make_sweep(model, 10.1)
     away = np.degrees(np.arccos(np.clip(one.directions[:, 0].astype(float), -1, 1)))
@@ -107,7 +107,7 @@ def test_a_rosette_fills_its_round_view_and_never_repeats() -> None:
 
 
 def test_an_unknown_or_impossible_model_is_refused() -> None:
-    """Neither lasers nor prisms is no scanner; ranges must rise."""
+    """A scanner has lasers or prisms; ranges must rise."""
     with pytest.raises(ConfigError, match=r"VLP-16.*did you mean 'HDL-64E'"):
         lidar_model("HDL-64")
 

@@ -1,4 +1,4 @@
-"""Sweeps of scanners that move, past things that move: against closed forms."""
+"""Sweeps of scanners that move, past bodies that move: against closed forms."""
 
 from dataclasses import replace
 
@@ -40,6 +40,10 @@ def scene_of(bodies: list[Body], *tracks: Trajectory) -> Scene:
     lidar = Lidar("velodyne", "", SE3((0.5, 0.0, 0.0)), rig="rig", sweep_s=PERIOD_S)
     scene = Scene("test", (cart, *bodies), tracks=tracks, rigs=(rig,), lidars=(lidar,))
     return scene_at(scene, 0.2)
+
+
+BEFORE_A_WALL = scene_of([Body("wall", "wall", SE3((30.1, 0.0, 0.0)))], moving("cart", (0, 0, -3)))
+"""A still wall, 30 m from the start of a turning scanner."""
 
 
 def sweep(scene: Scene, motion: str, **fields: object) -> PointCloud:
@@ -101,9 +105,7 @@ def test_a_moving_wall_is_met_where_it_is_when_each_pulse_leaves_unless_frozen()
 
 def test_raw_points_of_a_moving_scanner_are_in_the_frame_of_their_pulse() -> None:
     """Driven and turned by the closed form of the motion, they lie on the still wall; 1 mm."""
-    scene = scene_of([Body("wall", "wall", SE3((30.1, 0.0, 0.0)))], moving("cart", (0, 0, -3)))
-
-    cloud = sweep(scene, "raw")
+    cloud = sweep(BEFORE_A_WALL, "raw")
 
     yaw, eye_m = scanner_poses(times_s(cloud))
     p_world = eye_m + turned(yaw, cloud.points["position_m"].astype(np.float64))
@@ -114,9 +116,7 @@ def test_raw_points_of_a_moving_scanner_are_in_the_frame_of_their_pulse() -> Non
 
 def test_deskewed_points_are_in_the_frame_of_the_scene_s_instant() -> None:
     """The still wall is a plane there; as measured it is off by decimetres."""
-    scene = scene_of([Body("wall", "wall", SE3((30.1, 0.0, 0.0)))], moving("cart", (0, 0, -3)))
-
-    cloud, raw = sweep(scene, "deskewed"), sweep(scene, "raw")
+    cloud, raw = (sweep(BEFORE_A_WALL, motion) for motion in ("deskewed", "raw"))
 
     def wall_x(points: np.ndarray) -> np.ndarray:
         yaw, eye_m = scanner_poses(np.array([0.2]))
@@ -129,7 +129,7 @@ def test_deskewed_points_are_in_the_frame_of_the_scene_s_instant() -> None:
 
 
 def test_points_on_a_body_that_turns_past_a_turning_scanner_lie_on_it() -> None:
-    """Taken to the body's frame of their own instant, they are on its faces within 1 mm."""
+    """Taken to the body's frame at their instant, they are on its faces within 1 mm."""
     start = (9.0, 4.0, 0.0)
     scene = scene_of([Body("box", "box", SE3(start), instance_id=1)],
                      moving("box", start), moving("cart", (0, 0, -3), turning=False))  # fmt: skip
@@ -160,7 +160,7 @@ def test_where_nothing_moves_every_kind_of_sweep_is_the_same(motion: str) -> Non
 
 def test_a_scanner_beside_a_camera_rides_with_the_camera_s_rig() -> None:
     """As if it were on the rig itself."""
-    scene = scene_of([Body("wall", "wall", SE3((30.1, 0.0, 0.0)))], moving("cart", (0, 0, -3)))
+    scene = BEFORE_A_WALL
     T_rig_camera = SE3((0.5, 0.0, 0.0), (0.5, -0.5, 0.5, -0.5))
     camera = Camera("color", SE3(), Intrinsics(8, 8, 8.0, 8.0, 4.0, 4.0), None, "rig", T_rig_camera)
     beside = Scene("test", scene.bodies, cameras=(camera,), rigs=scene.rigs, tracks=scene.tracks,
@@ -190,10 +190,9 @@ def test_a_moving_sweep_made_again_is_the_same() -> None:
     start = (9.0, 4.0, 0.0)
     box = Body("box", "box", SE3(start), instance_id=1)
     scene = scene_of([box], moving("box", start), moving("cart", (0, 0, -3)))
-    other = scene_of([Body("wall", "wall", SE3((30.1, 0.0, 0.0)))], moving("cart", (0, 0, -3)))
     sensor = LidarSensor(name="velodyne", model="VLP-16", returns="dual", divergence=True)
     used = WarpRenderer(FakeLibrary(MESHES), "cpu")
-    sensor.capture(other, used, frozenset(), Streams(1, 2).rng("lidar"))
+    sensor.capture(BEFORE_A_WALL, used, frozenset(), Streams(1, 2).rng("lidar"))
 
     one, two = (
         sensor.capture(scene, renderer, frozenset(), Streams(1, 2).rng("lidar")).points
@@ -206,7 +205,7 @@ def test_a_moving_sweep_made_again_is_the_same() -> None:
 
 @pytest.mark.parametrize("motion", ["raw", "deskewed", "none"])
 def test_points_of_lasers_beside_the_axis_lie_on_the_walls(motion: str) -> None:
-    """Beams that pass beside the axis, at two heights, end on the walls of a hall."""
+    """Beams that pass the axis at a distance, at two heights, end on the walls of a hall."""
     hall = Body("hall", "hall", SE3((0.0, 0.0, -2.5)))
     sensor = LidarSensor(name="velodyne", model="HDL-64E", ideal=True, motion_distortion=motion)
     renderer = WarpRenderer(FakeLibrary(MESHES), "cpu")

@@ -1,10 +1,9 @@
-"""Cameras that look through photographs, and what else a photograph refuses."""
+"""Cameras that look through photographs, which refuse other sensors."""
 
 import json
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
 
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import nominal_scene
@@ -40,24 +39,6 @@ def test_it_looks_as_the_photograph_and_mounting_twice_changes_nothing() -> None
     scene = on_a_plate()
     assert has_plate(scene)
     assert scene.lights == ()
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [("hfov_deg", 70.0), ("rig", "ego"), ("lens", {"model": "pinhole"}), ("yaw_deg", 3.0)],
-)
-def test_geometry_of_its_own_is_refused(field: str, value: Any) -> None:
-    with pytest.raises(ValidationError, match=f"{field}: the photograph gives it"):
-        made(**{field: value})
-
-
-def test_developing_twice_by_default_is_refused() -> None:
-    """A pipeline without a preset is ``ideal``, which has a tone curve."""
-    with pytest.raises(ValidationError, match="the photograph was developed before"):
-        made(image_pipeline={"jpeg_quality": 90})
-    assert made(
-        image_pipeline={"preset": "photograph", "jpeg_quality": 90}
-    ).image_pipeline.jpeg_quality
 
 
 def test_it_needs_a_plate_with_its_name() -> None:

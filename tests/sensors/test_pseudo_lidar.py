@@ -83,7 +83,7 @@ def test_points_lie_on_the_surfaces_of_the_world(lens: Intrinsics) -> None:
 
 
 def test_the_frame_looks_along_the_axis_above_the_camera_and_far_points_are_left_out() -> None:
-    """X forward, Y left, Z up, 0.3 m over its centre: what KITTI's readers expect."""
+    """X forward, Y left, Z up, 0.3 m over its centre, as KITTI's readers expect."""
     world = scene(Intrinsics.from_hfov(64, 48, 1.2))
     lidar = cloud_of(PseudoLidar(), world).lidar
     T_camera_lidar = (world.cameras[0].T_world_camera.inverse() @ lidar.T_world_lidar).matrix()

@@ -122,7 +122,7 @@ def test_noise_of_range_azimuth_and_velocity_is_that_of_the_data_sheet() -> None
 @pytest.mark.slow
 @pytest.mark.parametrize(("range_m", "expected"), [(125.0, 0.956), (200.0, 0.745), (250.0, 0.5)])
 def test_detection_falls_with_the_fourth_power_of_range(range_m: float, expected: float) -> None:
-    """What 10 dBsm is at 250 m is what the radar equation makes of it: P = p^(1 / (1 + SNR)).
+    """10 dBsm at 250 m, by the radar equation: P = p^(1 / (1 + SNR)).
 
     SNR at 250 m is 18.9; 16 times as much at half of it, 2.44 times as much at 200 m.
     """
@@ -133,7 +133,7 @@ def test_detection_falls_with_the_fourth_power_of_range(range_m: float, expected
 
 def one_cell_share(range_m: float, readings: int) -> float:
     """How often a post of 10 dBsm is detected that lies in one cell of the far scan."""
-    # Turned so that its aspect has the mean cross section: cos(4 * 22.5 degrees) = 0.
+    # Turned until its aspect has the mean cross section: cos(4 * 22.5 degrees) = 0.
     post = thing(
         2,
         "post",
@@ -177,9 +177,9 @@ def test_a_car_behind_a_wall_gives_no_detection() -> None:
 
 
 def test_half_hidden_target_has_half_the_cross_section() -> None:
-    """A wall before one half of a car's rear: what is in sight is half of the box.
+    """A wall before one half of a car's rear: half of the box is in sight.
 
-    A car is taken to fill 0.85 of its box; these boxes are full, so that half is 0.5 / 0.85.
+    A car is taken to fill 0.85 of its box; these boxes are full: half is 0.5 / 0.85.
     """
     rear = ((-0.05, -1.25, 0.2), (0.05, 1.25, 3.2))
     car = thing(2, "car", "car", se3.SE3((40.0, 0.0, 0.0)), rear)
@@ -260,7 +260,7 @@ def test_strongest_are_kept_and_the_nearest_comes_first() -> None:
 
 @pytest.mark.parametrize("name", preset_names(PRESETS))
 def test_every_make_is_complete(name: str) -> None:
-    """Its looks cover what they say, and reach where they report."""
+    """Its looks cover their field, and reach where they report."""
     make = load_preset(PRESETS, name, RadarModel)
     for look in make.looks:
         assert 0.0 < look.range_m[0] < look.range_m[1] <= max(r for _, r in look.reach_m)
@@ -268,7 +268,7 @@ def test_every_make_is_complete(name: str) -> None:
 
 
 def test_every_surface_sends_back_what_its_kind_does() -> None:
-    """Whatever a ray may hit has a value; metal posts count by what they are."""
+    """Whatever a ray may hit has a value; metal posts count by their kind."""
     every = np.arange(len(asset_types.SURFACES), dtype=np.uint8)
     factors = radar_detection.area_factor("building", every)
 

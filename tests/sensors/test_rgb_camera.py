@@ -1,4 +1,4 @@
-"""The RGB camera: what it mounts, what it asks a renderer for."""
+"""The RGB camera: its mounting, and its requests to a renderer."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Sensors on rigs: where they are, when they read, and what cannot be."""
+"""Sensors on rigs: where they are, when they read, and their refusals."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_randomizers_of_poses_leave_cameras_on_rigs_alone(randomizer: Any) -> No
 
 
 def test_a_randomizer_of_poses_does_not_know_a_camera_on_a_rig() -> None:
-    """Asked for by name, it says which it could move."""
+    """Asked for by name, it lists cameras that it could move."""
     scene = driven(RgbCamera(name="front", rig="ego"), RgbCamera(name="free"))
 
     with pytest.raises(ConfigError, match=r"no camera 'front' without a rig; expected .*free"):
@@ -107,7 +107,7 @@ def test_a_randomizer_of_poses_does_not_know_a_camera_on_a_rig() -> None:
 
 
 class Watching:
-    """A sensor that returns where it was, as the scene it was handed says."""
+    """A sensor that returns where it was, by the scene it was handed."""
 
     def __init__(self, name: str, lidar: bool = False) -> None:
         self.name, self.lidar = name, lidar
@@ -121,7 +121,7 @@ class Watching:
 def sampled(
     index: int, offsets_s: Mapping[str, float] = {}, **recipe: Any
 ) -> tuple[Sample, dict[str, float], dict[str, float]]:
-    """What a camera and a scanner return, and the times that truth was asked for."""
+    """The reading of a camera and a scanner, and the times that truth was asked for."""
     annotated: dict[str, float] = {}
     swept: dict[str, float] = {}
 
@@ -250,7 +250,7 @@ def test_a_wrist_camera_follows_the_arm() -> None:
 
 
 def test_sensors_that_read_before_anything_moves_are_named(recwarn: Any) -> None:
-    """Velocities of moving things would be 0 in the first image of each sequence."""
+    """Velocities of moving bodies would be 0 in the first image of each sequence."""
     early, late = RgbCamera(name="early", time_offset_s=-0.02), RgbCamera(time_offset_s=0.02)
 
     warn_of_early_readings([late], 4)

@@ -8,7 +8,7 @@ from gen_data.sensors.camera.optics import smear
 
 @pytest.mark.parametrize("angle_deg", [0.0, 30.0, 90.0, 135.0])
 def test_a_point_of_light_becomes_a_line_of_the_same_energy(angle_deg: float) -> None:
-    """Its second moments are those of a segment: length squared over 12 along it, none across."""
+    """Its second moments are as of a segment: length squared over 12 along it, none across."""
     image = np.zeros((61, 61, 3), np.float32)
     image[30, 30] = 1000.0
     out = smear(image, 12.0, np.radians(angle_deg))[..., 0].astype(np.float64)

@@ -15,24 +15,22 @@ from gen_data.assets.readers import MeshSource, read_mesh
 from gen_data.assets.texture_maps import find_maps
 from gen_data.assets.usd_stages import stage_model
 from gen_data.core.errors import AssetError
+from tests.usd import stages
+from tests.usd.stages import add_reader, bind, surface
 
 RED, BLUE = Gf.Vec3f(1, 0, 0), Gf.Vec3f(0, 0, 1)
 
 
 def new_stage(folder: Path) -> Usd.Stage:
-    stage = Usd.Stage.CreateNew(str(folder / "a.usda"))
-    UsdGeom.SetStageUpAxis(stage, "Z")
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage = stages.new_stage(folder / "a.usda", "Z", 1.0)
     UsdGeom.Xform.Define(stage, "/W")
     return stage
 
 
 def add_quads(stage: Usd.Stage, path: str = "/W/M") -> UsdGeom.Mesh:
     """Two squares side by side, without subdivision."""
-    mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 0)])
-    mesh.CreateFaceVertexCountsAttr([4, 4])
-    mesh.CreateFaceVertexIndicesAttr([0, 1, 4, 3, 1, 2, 5, 4])
+    points = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 0)]
+    mesh = stages.add_mesh(stage, path, points, (0, 1, 4, 3), (1, 2, 5, 4))
     mesh.CreateSubdivisionSchemeAttr("none")
     return mesh
 
@@ -72,36 +70,24 @@ def test_display_colours_are_inherited_hidden_by_materials_or_used_by_them(tmp_p
     bound.AddTranslateOp().Set((0, 3, 0))
     primvars = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/W"))
     primvars.CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray, "constant").Set([RED])
-    material, shader = surface(stage)
-    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set((0, 0.5, 0))
-    UsdShade.MaterialBindingAPI.Apply(bound.GetPrim()).Bind(material)
+    material, _ = surface(stage, "/W/Look", diffuseColor=(0, 0.5, 0))
+    bind(bound, material)
     stage.Save()
     mesh = import_object(Folder(tmp_path), MeshEntry(file="a.usda"), "user/a").mesh
     assert mesh is not None
     shown = {m.base_color for m in mesh.materials}
     assert shown == {(0.85, 0.0, 0.0), (0.0, 0.5, 0.0)}
-    (tmp_path / "b").mkdir()
     stage = new_stage(tmp_path / "b")
     mesh = add_quads(stage)
     mesh.CreateDisplayColorPrimvar("uniform").Set([RED, BLUE])
-    material, shader = surface(stage)
-    reader = UsdShade.Shader.Define(stage, "/W/Look/R")
-    reader.CreateIdAttr("UsdPrimvarReader_float3")
-    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+    material, shader = surface(stage, "/W/Look")
+    reader = add_reader(stage, "/W/Look/R", "float3", "displayColor")
     source = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
     source.ConnectToSource(reader.ConnectableAPI(), "result")
-    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+    bind(mesh, material)
     colors = saved(stage, tmp_path / "b").soup.colors
     assert colors is not None
     assert colors[:, 0].tolist() == [[1, 0, 0], [1, 0, 0], [0, 0, 1], [0, 0, 1]]
-
-
-def surface(stage: Usd.Stage) -> tuple[UsdShade.Material, UsdShade.Shader]:
-    material = UsdShade.Material.Define(stage, "/W/Look")
-    shader = UsdShade.Shader.Define(stage, "/W/Look/S")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
-    return material, shader
 
 
 @pytest.mark.parametrize("hides", ["opacity", "presence", "displayOpacity"])
@@ -112,12 +98,9 @@ def test_opacity_0_hides_and_glass_stays(tmp_path: Path, hides: str) -> None:
     if hides == "displayOpacity":
         mesh.CreateDisplayOpacityPrimvar("constant").Set([0.0])
     else:
-        material, shader = surface(stage)
-        shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(0.0)
-        if hides == "presence":
-            shader.CreateInput("opacityMode", Sdf.ValueTypeNames.Token).Set("presence")
-            shader.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(1.5)
-        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+        presence = {"opacityMode": "presence", "ior": 1.5} if hides == "presence" else {}
+        material, shader = surface(stage, "/W/Look", opacity=0.0, **presence)
+        bind(mesh, material)
     stage.Save()
     entry = MeshEntry(file="a.usda")
     with pytest.raises(AssetError, match="fully transparent"):
@@ -228,19 +211,15 @@ def textured(
     for name, value in inputs.items():
         of = Sdf.ValueTypeNames.Token if name == "sourceColorSpace" else Sdf.ValueTypeNames.Float4
         image.CreateInput(name, of).Set(value)
-    surface = bound_surface(stage, mesh)
-    surface.CreateInput(key, kind).ConnectToSource(image.ConnectableAPI(), output)
+    shader = bound_surface(stage, mesh)
+    shader.CreateInput(key, kind).ConnectToSource(image.ConnectableAPI(), output)
     return saved(stage, folder)
 
 
 def bound_surface(stage: Usd.Stage, mesh: UsdGeom.Mesh, purpose: str = "") -> UsdShade.Shader:
-    material = UsdShade.Material.Define(stage, "/W/Paint")
-    surface = UsdShade.Shader.Define(stage, "/W/Paint/Surface")
-    surface.CreateIdAttr("UsdPreviewSurface")
-    material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
-    binding = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
-    binding.Bind(material, materialPurpose=purpose or UsdShade.Tokens.allPurpose)
-    return surface
+    material, shader = surface(stage, "/W/Paint")
+    bind(mesh, material, purpose)
+    return shader
 
 
 def texels(found: MeshSource, channel: str = "albedo") -> list[list[int]]:
@@ -290,20 +269,18 @@ def test_an_image_of_normals_with_y_downwards_is_turned(tmp_path: Path) -> None:
 @pytest.mark.parametrize("purpose", ["preview", "full"])
 def test_materials_that_are_bound_for_one_purpose_are_used(tmp_path: Path, purpose: str) -> None:
     stage = new_stage(tmp_path)
-    surface = bound_surface(stage, add_quads(stage), purpose)
-    surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(RED)
+    shader = bound_surface(stage, add_quads(stage), purpose)
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(RED)
     (slot,) = saved(stage, tmp_path).soup.slots
     assert (slot.name, slot.material.base_color) == ("Paint", (1.0, 0.0, 0.0))
 
 
 def test_the_fallback_of_a_missing_primvar_is_the_colour(tmp_path: Path) -> None:
     stage = new_stage(tmp_path)
-    surface = bound_surface(stage, add_quads(stage))
-    reader = UsdShade.Shader.Define(stage, "/W/Reader")
-    reader.CreateIdAttr("UsdPrimvarReader_float3")
-    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("nowhere")
+    shader = bound_surface(stage, add_quads(stage))
+    reader = add_reader(stage, "/W/Reader", "float3", "nowhere")
     reader.CreateInput("fallback", Sdf.ValueTypeNames.Float3).Set(BLUE)
-    given = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    given = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
     given.ConnectToSource(reader.ConnectableAPI(), "result")
     (slot,) = saved(stage, tmp_path).soup.slots
     assert slot.material.base_color == (0.0, 0.0, 1.0)
@@ -327,12 +304,12 @@ def test_holes_of_a_mesh_are_open_and_do_not_shift_colours_of_polygons(tmp_path:
 def test_inputs_of_a_material_without_a_counterpart_are_named(tmp_path: Path) -> None:
     """Only where they have an effect: the colour of reflections in its own workflow."""
     stage = new_stage(tmp_path)
-    surface = bound_surface(stage, add_quads(stage))
-    surface.CreateInput("specularColor", Sdf.ValueTypeNames.Color3f).Set(RED)
-    surface.CreateInput("displacement", Sdf.ValueTypeNames.Float).Set(0.0)
+    shader = bound_surface(stage, add_quads(stage))
+    shader.CreateInput("specularColor", Sdf.ValueTypeNames.Color3f).Set(RED)
+    shader.CreateInput("displacement", Sdf.ValueTypeNames.Float).Set(0.0)
     assert saved(stage, tmp_path).remarks == ()
-    surface.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(1)
-    surface.GetInput("displacement").Set(0.1)
+    shader.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(1)
+    shader.GetInput("displacement").Set(0.1)
     assert saved(stage, tmp_path).remarks == (
         "material 'Paint': specularColor is not used",
         "material 'Paint': displacement is not used",

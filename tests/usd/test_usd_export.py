@@ -1,4 +1,4 @@
-"""The stage shows what the labels say; read by OpenUSD's own classes."""
+"""The stage agrees with the labels; read by OpenUSD's own classes."""
 
 import json
 import shutil
@@ -132,7 +132,7 @@ def test_lights_are_photometric_and_a_bodys_materials_replace_its_meshs(sequence
     # The image's centre: +Z of USD's sky, +X of ours, turned by 0.4 rad.
     centre = sky.ComputeLocalToWorldTransform(0).TransformDir((0, 0, 1))
     assert list(centre) == pytest.approx([np.cos(0.4), np.sin(0.4), 0.0])
-    # The red thing is red in every part, and no image is left of what it was.
+    # The red body is red in every part, and no image is left of its materials.
     reds = 0
     for prim in Usd.PrimRange(
         sequence.GetPrimAtPath("/World/clutter_0"), Usd.TraverseInstanceProxies()
@@ -192,7 +192,7 @@ def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Pa
 
 @pytest.mark.parametrize("steps", [1, STEPS])
 def test_an_offset_camera_has_its_poses(library: Library, tmp_path: Path, steps: int) -> None:
-    """It rides on the thing that moves by 0.2 m/s along X; so do the poses of all other things."""
+    """It rides on a body that moves by 0.2 m/s along X; all poses are offset alike."""
     world = table_world(library)
     camera = replace(off_centre_camera(), rig="mover")
     scene = replace(world, cameras=(camera,), rigs=(Rig("mover", "clutter/0"),))
@@ -235,7 +235,7 @@ def test_every_lens_is_beside_the_pinhole(library: Library, tmp_path: Path, mode
 
 
 def test_only_storage_is_blamed_for_a_file_that_cannot_be_written(tmp_path: Path) -> None:
-    """A mistake in what is written keeps its own error."""
+    """A mistake in the content keeps its own error."""
     with (
         pytest.raises(StorageError, match="space and rights"),
         open_stage_for_writing(tmp_path / "a.unknown", "/World"),

@@ -1,4 +1,4 @@
-"""What becomes of dipped headlights in USD, which has no cut-off."""
+"""Dipped headlights in USD, which has no cut-off."""
 
 import math
 
@@ -11,7 +11,7 @@ from gen_data.usd.lights import define_light
 
 
 def test_the_spot_of_a_dipped_headlight_lies_below_its_cutoff() -> None:
-    """Its upper edge is 1 % below the horizon, as far as the spot's own direction says."""
+    """Its upper edge is 1 % below the horizon, by the spot's own direction."""
     stage = Usd.Stage.CreateInMemory()
     beam = dipped_beam("beam", SE3.about_z(0.5, (1.0, 2.0, 0.7)), 10_000.0)
     define_light(stage, "/beam", [beam])

@@ -14,6 +14,7 @@ from gen_data.core.errors import AssetError
 from gen_data.core.scene import Scene
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.scene_templates.usd_stage import UsdStage
+from tests.usd.stages import add_mesh, add_reader, bind, new_stage, surface
 from tests.usd.worlds import exported, table_world
 
 QUAD = [(0, 0, 0), (100, 0, 0), (100, 50, 0), (0, 50, 0)]
@@ -23,37 +24,15 @@ def opened_library(folder: Path, *roots: Path) -> Library:
     return open_library(roots, cache_dir=folder / "cache", packs=Path("/nonexistent"))
 
 
-def new_stage(path: Path, up: str = "Y", metres: float = 0.01) -> Usd.Stage:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    stage = Usd.Stage.CreateNew(str(path))
-    UsdGeom.SetStageUpAxis(stage, up)
-    UsdGeom.SetStageMetersPerUnit(stage, metres)
-    return stage
-
-
 def add_quad(stage: Usd.Stage, path: str) -> UsdGeom.Mesh:
     """A rectangle of 1 m x 0.5 m in the plane Z = 0."""
-    mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.CreatePointsAttr(QUAD)
-    mesh.CreateFaceVertexCountsAttr([4])
-    mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 3])
-    return mesh
-
-
-def surface(stage: Usd.Stage, path: str) -> tuple[UsdShade.Material, UsdShade.Shader]:
-    material = UsdShade.Material.Define(stage, path)
-    shader = UsdShade.Shader.Define(stage, f"{path}/S")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
-    return material, shader
+    return add_mesh(stage, path, QUAD, (0, 1, 2, 3))
 
 
 def textured(stage: Usd.Stage, path: str, image: str) -> UsdShade.Material:
     """A material whose colour is half of an image, looked up by the primvar ``map``."""
     material, shader = surface(stage, path)
-    reader = UsdShade.Shader.Define(stage, f"{path}/R")
-    reader.CreateIdAttr("UsdPrimvarReader_float2")
-    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("map")
+    reader = add_reader(stage, f"{path}/R", "float2", "map")
     node = UsdShade.Shader.Define(stage, f"{path}/T")
     node.CreateIdAttr("UsdUVTexture")
     node.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(image)
@@ -67,7 +46,7 @@ def textured(stage: Usd.Stage, path: str, image: str) -> UsdShade.Material:
 
 @pytest.mark.slow
 def test_an_exported_world_comes_back_with_its_lights_and_cameras(tmp_path: Path) -> None:
-    """The same camera sees the same things: label images agree to more than 99 %."""
+    """The same camera sees the same objects: label images agree to more than 99 %."""
     library = opened_library(tmp_path)
     world = table_world(library)
     root = exported(world, library, tmp_path / "out").parent
@@ -124,21 +103,17 @@ def test_an_exported_world_comes_back_with_its_lights_and_cameras(tmp_path: Path
 def test_units_axes_subsets_and_materials_are_read(tmp_path: Path) -> None:
     """Centimetres, Y up: a wall of 1 m x 0.5 m; each half has its own material."""
     stage = new_stage(tmp_path / "props/wall.usda")
-    mesh = add_quad(stage, "/Wall/Mesh")
-    mesh.CreateFaceVertexCountsAttr([3, 3])
-    mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 0, 2, 3])
+    mesh = add_mesh(stage, "/Wall/Mesh", QUAD, (0, 1, 2), (0, 2, 3))
     UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
         "map", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
     ).Set([(0, 0), (2, 0), (2, 1), (0, 1)])
     Image.fromarray(np.full((4, 4, 3), (200, 10, 10), np.uint8)).save(tmp_path / "props/red.png")
-    metal, shader = surface(stage, "/Wall/Metal")
-    shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(1.0)
-    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.25)
-    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set((0.9, 0.8, 0.7))
+    looks = {"metallic": 1.0, "roughness": 0.25, "diffuseColor": (0.9, 0.8, 0.7)}
+    metal, _ = surface(stage, "/Wall/Metal", **looks)
     binding = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
     for k, material in enumerate((metal, textured(stage, "/Wall/Red", "./red.png"))):
         part = binding.CreateMaterialBindSubset(f"part{k}", [k])
-        UsdShade.MaterialBindingAPI.Apply(part.GetPrim()).Bind(material)
+        bind(part, material)
     stage.Save()
     library = opened_library(tmp_path, tmp_path / "props")
     read = library.mesh("user/wall")
@@ -154,12 +129,17 @@ def test_units_axes_subsets_and_materials_are_read(tmp_path: Path) -> None:
     assert read.uvs[corners].max(axis=0) == pytest.approx([2.0, 1.0])
 
 
-def test_instances_transforms_and_references_are_followed(tmp_path: Path) -> None:
-    """Two instances of a layer in a subfolder, one turned and scaled, one hidden."""
-    part = new_stage(tmp_path / "props/parts/quad.usdc")
+def save_part(path: Path) -> None:
+    """A layer to refer to, with one quad."""
+    part = new_stage(path)
     add_quad(part, "/Quad/Mesh")
     part.SetDefaultPrim(part.GetPrimAtPath("/Quad"))
     part.Save()
+
+
+def test_instances_transforms_and_references_are_followed(tmp_path: Path) -> None:
+    """Two instances of a layer in a subfolder, one turned and scaled, one hidden."""
+    save_part(tmp_path / "props/parts/quad.usdc")
     stage = new_stage(tmp_path / "props/pair.usdc")
     for k, name in enumerate(("a", "b", "hidden")):
         prim = UsdGeom.Xform.Define(stage, f"/World/{name}")
@@ -180,11 +160,11 @@ def test_instances_transforms_and_references_are_followed(tmp_path: Path) -> Non
 
 
 def test_an_archive_brings_its_images(tmp_path: Path) -> None:
-    """A usdz file is read without anything beside it."""
+    """A usdz file is read without any other file."""
     Image.fromarray(np.full((4, 4, 3), (10, 200, 10), np.uint8)).save(tmp_path / "green.png")
     stage = new_stage(tmp_path / "leaf.usda")
     mesh = add_quad(stage, "/Leaf")
-    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(textured(stage, "/M", "./green.png"))
+    bind(mesh, textured(stage, "/M", "./green.png"))
     stage.Save()
     (tmp_path / "props").mkdir()
     assert UsdUtils.CreateNewUsdzPackage(
@@ -205,16 +185,12 @@ def broken(folder: Path, kind: str) -> None:
     else:
         mesh = add_quad(stage, "/Quad")
         if kind == "is missing":
-            material = textured(stage, "/M", "./nowhere.png")
-            UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+            bind(mesh, textured(stage, "/M", "./nowhere.png"))
         elif kind == "UsdPreviewSurface":
-            material = UsdShade.Material.Define(stage, "/M")
-            UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+            bind(mesh, UsdShade.Material.Define(stage, "/M"))
         elif kind.startswith("roughness"):
-            material, shader = surface(stage, "/M")
             roughness = float(kind.rstrip(",").split()[-1])
-            shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(roughness)
-            UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+            bind(mesh, surface(stage, "/M", roughness=roughness)[0])
         elif kind == "inconsistent":
             mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 9])
         elif kind == "No such file":
@@ -275,10 +251,7 @@ def test_bytes_that_are_no_crate_file_are_refused(tmp_path: Path) -> None:
 
 def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
     """A changed layer below is another asset."""
-    part = new_stage(tmp_path / "props/parts/quad.usda")
-    add_quad(part, "/Quad/Mesh")
-    part.SetDefaultPrim(part.GetPrimAtPath("/Quad"))
-    part.Save()
+    save_part(tmp_path / "props/parts/quad.usda")
     stage = new_stage(tmp_path / "props/one.usda")
     UsdGeom.Xform.Define(stage, "/W").GetPrim().GetReferences().AddReference("./parts/quad.usda")
     stage.Save()
@@ -301,7 +274,6 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
 def test_an_impossible_light_of_a_stage_is_refused(
     tmp_path: Path, attribute: str, value: object, said: str
 ) -> None:
-    (tmp_path / "props").mkdir()
     stage = new_stage(tmp_path / "props/s.usda")
     add_quad(stage, "/Quad")
     panel = UsdLux.RectLight.Define(stage, "/Panel")
@@ -314,7 +286,6 @@ def test_an_impossible_light_of_a_stage_is_refused(
 
 def test_normalised_panels_of_any_size_and_scaled_stages_keep_their_light(tmp_path: Path) -> None:
     """UsdLux: intensity 500, normalised, is 500 cd from 0.1 m^2 or 4 m^2 alike."""
-    (tmp_path / "props").mkdir()
     stage = new_stage(tmp_path / "props/s.usda")
     add_quad(stage, "/Quad")
     for name, width in (("A", 0.5), ("B", 20.0)):

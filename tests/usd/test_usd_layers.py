@@ -1,17 +1,17 @@
-"""Coats, glass, holes and further maps: what is exported comes back, and nonsense is refused."""
+"""Coats, glass, holes and further maps: exported, they come back, and nonsense is refused."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdShade
 
 from gen_data.assets.library import open_library
 from gen_data.core.asset_types import Material, MeshData, TextureData
 from gen_data.core.errors import AssetError
 from gen_data.exporters.usd import _SharedFiles
 from tests.renderers.fake_library import FakeLibrary, plane_mesh
+from tests.usd.stages import add_mesh, bind, new_stage, surface
 
 
 def returned(folder: Path, material: Material, texture: TextureData | None = None) -> MeshData:
@@ -33,7 +33,7 @@ def returned(folder: Path, material: Material, texture: TextureData | None = Non
     ids=lambda changes: next(iter(changes)),
 )  # fmt: skip
 def test_numbers_come_back(tmp_path: Path, changes: dict[str, object]) -> None:
-    """Each kind of layer by itself; what was not given is what it was."""
+    """Each kind of layer by itself; other values do not change."""
     material = replace(Material(base_color=(0.5, 0.25, 0.125)), **changes)
     (read,) = returned(tmp_path, material).materials
     names = ("coat", "coat_roughness", "transmission", "opacity", "emission_cd_m2", "base_color")
@@ -68,22 +68,6 @@ def test_maps_come_back(tmp_path: Path) -> None:
     assert mesh.uvs.max() == 1.0
 
 
-def bad_stage(path: Path, name: str, value: object, kind: Sdf.ValueTypeName) -> None:
-    path.parent.mkdir()
-    stage = Usd.Stage.CreateNew(str(path))
-    mesh = stage.DefinePrim("/Mesh", "Mesh")
-    mesh.GetAttribute("points").Set([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
-    mesh.GetAttribute("faceVertexCounts").Set([3])
-    mesh.GetAttribute("faceVertexIndices").Set([0, 1, 2])
-    material = UsdShade.Material.Define(stage, "/Glaze")
-    shader = UsdShade.Shader.Define(stage, "/Glaze/S")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    shader.CreateInput(name, kind).Set(value)
-    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
-    UsdShade.MaterialBindingAPI.Apply(mesh).Bind(material)
-    stage.Save()
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [("roughness", 1.5), ("metallic", -1.0), ("clearcoat", 2.0), ("opacity", -0.5),
@@ -91,8 +75,10 @@ def bad_stage(path: Path, name: str, value: object, kind: Sdf.ValueTypeName) -> 
 )  # fmt: skip
 def test_values_out_of_range_are_one_clear_error(tmp_path: Path, name: str, value: object) -> None:
     """The file, the material and the input are named."""
-    kind = Sdf.ValueTypeNames.Color3f if name == "emissiveColor" else Sdf.ValueTypeNames.Float
-    bad_stage(tmp_path / "props" / "bad.usda", name, value, kind)
+    stage = new_stage(tmp_path / "props" / "bad.usda")
+    material, _ = surface(stage, "/Glaze", **{name: value})
+    bind(add_mesh(stage, "/Mesh", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], (0, 1, 2)), material)
+    stage.Save()
     library = open_library([tmp_path / "props"], cache_dir=tmp_path / "cache")
     with pytest.raises(AssetError, match=rf"bad\.usda: material /Glaze: {name} is .*correct it"):
         library.mesh("user/bad")

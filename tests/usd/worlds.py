@@ -1,4 +1,4 @@
-"""A small world of the library's own things, and its stage on disk."""
+"""A small world of the library's own objects, and its stage on disk."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def off_centre_camera() -> Camera:
 
 
 def table_world(library: Library) -> Scene:
-    """Four things on a plane; the first, in red, moves; the second is half as large again."""
+    """Four objects on a plane; the first, in red, moves; the second is half as large again."""
     poses = [SE3.about_z(0.7 * k, (0.16 * (k % 2), 0.18 * (k // 2), 0.08)) for k in range(4)]
     bodies = [Body("ground", "plane")]
     instances = []

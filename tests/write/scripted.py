@@ -9,7 +9,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 Answer = str | bytes | Callable[[BaseHTTPRequestHandler], None]
-"""A message of the assistant; a whole body; or what writes head and body."""
+"""A message of the assistant; a whole body; or a function that writes head and body."""
 
 
 @dataclass

@@ -131,7 +131,7 @@ def test_a_stream_without_end_ends(answer: Answer, fact: str) -> None:
 
 @pytest.mark.parametrize("begins", [False, True])
 def test_a_server_that_is_slow_is_left(begins: bool) -> None:
-    """It says nothing at all, or one byte now and then, each within the limit of a socket."""
+    """It sends nothing at all, or one byte now and then, each within the limit of a socket."""
     with serve([]) as waiting:
 
         def drip(handler: BaseHTTPRequestHandler) -> None:

@@ -3,7 +3,7 @@
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,7 @@ def ask(script: Scripted, out: Path, **options: Any) -> Written:
 
 
 def errors_of(reply: str, out: Path) -> str:
-    """What a model is told of its only reply."""
+    """The errors that a model is told of its only reply."""
     told: list[str] = []
     with serve([reply]) as script, pytest.raises(ConfigError, match=r"\(replies: 1\); nothing was"):
         ask(script, out, turns=1, on_errors=told.append)
@@ -153,17 +153,14 @@ def test_a_reply_that_is_no_configuration_is_an_error(out: Path, reply: str, fac
     assert list(out.parent.iterdir()) == []
 
 
+NAMES = ("PRIVATE/secret.yaml", "../private/secret.yaml", "secret.yaml", "~/secret.yaml")
+"""Of a secret file in ways that a reply may write them; PRIVATE is the path of its folder."""
 WATCHED = ("open", "socket.connect", "subprocess.Popen", "os.system")
 _watched: list[tuple[str, str]] | None = None
 
 
 def _watch(event: str, arguments: tuple[Any, ...]) -> None:
-    if _watched is not None and event in (
-        "open",
-        "socket.connect",
-        "subprocess.Popen",
-        "os.system",
-    ):
+    if _watched is not None and event in WATCHED:
         _watched.append((event, str(arguments[1] if event == "socket.connect" else arguments[0])))
 
 
@@ -182,36 +179,28 @@ def watched() -> Iterator[list[tuple[str, str]]]:
 @pytest.mark.parametrize(
     "reply",
     [
-        lambda secret: json.dumps({"extends": str(secret)}),
-        lambda secret: json.dumps({"extends": f"../private/{secret.name}"}),
-        lambda secret: json.dumps({"extends": "secret.yaml"}),
-        lambda secret: json.dumps({"extends": "~/secret.yaml"}),
-        lambda secret: json.dumps({"extends": "https://127.0.0.1:1/a.yaml"}),
-        lambda secret: changed(elements={}, template=str(secret)),
-        lambda secret: changed(elements={}, template="secret"),
-        lambda secret: changed(assets={"folders": [str(secret.parent)]}),
-        lambda secret: changed(assets={"folders": ["https://127.0.0.1:1/meshes"]}),
-        lambda secret: changed(sensors=[{"type": "lidar", "name": "top", "model": str(secret)}]),
-        lambda secret: changed(sensors=[{"type": "lidar", "name": "top", "model": "secret.yaml"}]),
-        lambda secret: with_sensor(calibration=str(secret)),
-        lambda secret: with_sensor(calibration={"file": f"x/../../private/{secret.name}"}),
-        lambda secret: with_sensor(name="../private/camera"),
-        lambda secret: changed(exporters=[{"type": "coco", "name": "../../private"}]),
-        lambda secret: changed(randomizers=[{"type": "arm_task", "tasks": str(secret)}]),
-        lambda secret: changed(randomizers=[{"type": "arm_task", "tasks": "secret.yaml"}]),
-        lambda secret: changed(
-            elements=[{"name": "stage", "type": "usd_stage", "asset": f"user/{secret}"}]
-        ),
-        lambda secret: changed(
-            elements=[{"name": "m", "type": "objects", "assets": {"ids": [f"{secret}"]}}]
-        ),
+        *(json.dumps({"extends": name}) for name in (*NAMES, "https://127.0.0.1:1/a.yaml")),
+        changed(elements={}, template="PRIVATE/secret.yaml"),
+        changed(elements={}, template="secret"),
+        changed(assets={"folders": ["PRIVATE"]}),
+        changed(assets={"folders": ["https://127.0.0.1:1/meshes"]}),
+        *(changed(sensors=[{"type": "lidar", "name": "top", "model": name}]) for name in NAMES),
+        *(with_sensor(calibration=name) for name in NAMES),
+        with_sensor(calibration={"file": "x/../../private/secret.yaml"}),
+        with_sensor(name="../private/camera"),
+        changed(exporters=[{"type": "coco", "name": "../../private"}]),
+        *(changed(randomizers=[{"type": "arm_task", "tasks": name}]) for name in NAMES),
+        *(changed(elements=[{"name": "stage", "type": "usd_stage", "asset": f"user/{name}"}])
+          for name in NAMES),
+        *(changed(elements=[{"name": "m", "type": "objects", "assets": {"ids": [name]}}])
+          for name in NAMES),
     ],
-)
+)  # fmt: skip
 def test_no_reply_reads_or_writes_other_files_or_asks_other_hosts(
     tmp_path: Path,
     out: Path,
     watched: list[tuple[str, str]],
-    reply: Callable[[Path], str],
+    reply: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A secret lies next to the chosen file, in another folder, at home and where the user is."""
@@ -222,7 +211,7 @@ def test_no_reply_reads_or_writes_other_files_or_asks_other_hosts(
     monkeypatch.setenv("HOME", str(private))
     monkeypatch.chdir(private)
 
-    with serve([reply(private / "secret.yaml")]) as script:
+    with serve([reply.replace("PRIVATE", str(private))]) as script:
         told: list[str] = []
         watched.clear()
         with pytest.raises(ConfigError, match="nothing was written"):
@@ -240,7 +229,7 @@ def test_no_reply_reads_or_writes_other_files_or_asks_other_hosts(
 
 
 def test_a_shipped_name_next_to_a_file_of_that_name_is_refused(out: Path) -> None:
-    """The written file would mean another one than what was shown."""
+    """The written file would mean another one than was shown."""
     (out.parent / "tabletop.yaml").write_text("template: other")
 
     assert errors_of('{"extends": "tabletop.yaml"}', out).splitlines() == [

@@ -129,7 +129,7 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
             frames |= {} if frame is None else {"rectified": Frame(optical=True)}
             frames |= {} if frame is None else {number or single: frame}
     if not cameras and not rectified:
-        # OpenCV's sample stereo_calib writes R and T to a file of their own.
+        # OpenCV's sample stereo_calib writes R and T to a separate file.
         frames = _pair_frames(entries)
     if not cameras and not frames:
         known = "projection matrix such as P" if rectified else "camera matrix such as K"

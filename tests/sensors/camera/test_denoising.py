@@ -1,11 +1,14 @@
 """Noise reduction in cameras, against the statistics of photons."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.core import asset_types, colorimetry, intrinsics, scene, se3, streams
-from gen_data.sensors.camera import denoising, exposure, image_pipeline
+from gen_data.core import asset_types, colorimetry
+from gen_data.sensors.camera import denoising, exposure
+from tests.sensors.camera.photographs import EYE, made, photo
 
 WHITE_E, READ_NOISE_E = 200.0, 3.0
 
@@ -52,7 +55,7 @@ def test_colour_blotches_fall_more_than_grain() -> None:
 
 
 def test_edges_stay() -> None:
-    """Three pixels beside a strong edge, both sides have their own values."""
+    """Three pixels from a strong edge, both sides have their own values."""
     image = grey(0.1)
     image[:, 48:] = 0.6
     after = denoising.denoise(noisy(image), WHITE_E, READ_NOISE_E, 1.0)
@@ -63,19 +66,13 @@ def test_edges_stay() -> None:
 
 def picture(ev100: float, strength: float) -> NDArray[np.uint8]:
     """A grey wall at middle grey, by a small sensor with automatic exposure down to ISO 6400."""
-    eye = scene.Camera(
-        "eye", se3.SE3(), intrinsics.Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0), ev100=ev100
+    pipeline = made(
+        image_sensor={"full_well_e": 10_000, "read_noise_e": 2},
+        exposure_control={"f_number": 1.8, "time_s": [1e-5, 1 / 30], "iso": [50, 6400]},
+        denoise=strength,
     )
-    pipeline = image_pipeline.ImagePipeline.model_validate({
-        "image_sensor": {"full_well_e": 10_000, "read_noise_e": 2},
-        "exposure_control": {"f_number": 1.8, "time_s": [1e-5, 1 / 30], "iso": [50, 6400]},
-        "denoise": strength,
-    })  # fmt: skip
-    wall = np.full((48, 64, 3), 0.18 * 1.2 * 2.0**ev100, np.float32)
-    rng = streams.Streams(seed=5, scene=0).rng("test")
-    return image_pipeline.develop(
-        image_pipeline.take_shot(wall, None, eye, scene.Weather(), pipeline, rng)
-    ).rgb
+    wall = np.full((48, 64, 3), 0.18 * 1.2 * 2.0**ev100)
+    return photo(wall, pipeline, replace(EYE, ev100=ev100)).rgb
 
 
 def test_the_stage_changes_dim_pictures_alone() -> None:

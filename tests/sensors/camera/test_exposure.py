@@ -50,7 +50,7 @@ def test_black_pixels_are_not_metered_and_darkness_is_finite() -> None:
 
 @pytest.mark.parametrize("mean", [0.18, 0.36, 0.6])
 def test_metering_of_the_mean_reaches_it(mean: float) -> None:
-    """The mean of what the sensor records: 1 where it saturates; within a step of 1/256 EV."""
+    """The mean of the sensor's values: 1 where it saturates; within a step of 1/256 EV."""
     view = np.repeat(np.geomspace(3.0, 30_000.0, 4096).reshape(64, 64, 1), 3, axis=2)
 
     exposed = view / saturation_cd_m2(meter_mean_ev100(view.astype(np.float32), mean))

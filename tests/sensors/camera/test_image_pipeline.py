@@ -1,6 +1,6 @@
 """The image pipeline as one chain: its order, its presets, its place in configurations."""
 
-import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,27 +15,18 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.core.scene import Camera, Scene, Weather
 from gen_data.core.se3 import SE3
-from gen_data.core.streams import Rng, Streams
+from gen_data.core.streams import Streams
 from gen_data.sensors.camera.image_pipeline import (
     PRESETS,
     STAGES,
     ImagePipeline,
     capture_photograph,
-    develop,
-    take_shot,
 )
 from gen_data.sensors.camera.isp import display_values, to_bytes
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.device_presets import preset_names
+from tests.sensors.camera.photographs import EYE, WHITE_CD_M2, made, photo, rng
 from tests.sensors.recorder import Recorder
-
-LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
-CAMERA = Camera("eye", SE3(), LENS, ev100=8.0)
-WHITE_CD_M2 = 1.2 * 2.0**8
-
-
-def rng() -> Rng:
-    return Streams(seed=5, scene=0).rng("test")
 
 
 def speckled(height: int = 48, width: int = 64) -> Any:
@@ -64,15 +55,11 @@ def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
         "jpeg_quality": 40,
     }  # fmt: skip
 
-    # Half of it in shade: what saturates shows no balance.
-    radiance = speckled() * np.where(np.arange(64) < 32, np.float32(0.05), 1.0)[None, :, None]
+    # Half of it in shade: saturated pixels show no balance.
+    radiance = speckled() * np.where(np.arange(64) < 32, 0.05, 1.0)[None, :, None]
 
     def picture(given: dict[str, Any], weather: Weather) -> Any:
-        pipeline = ImagePipeline.model_validate_json(json.dumps(given))
-        depth_m = np.full((48, 64), 2.0)
-        return develop(
-            take_shot(np.float32(radiance), depth_m, CAMERA, weather, pipeline, rng())
-        ).rgb
+        return photo(radiance, made(**given), depth_m=np.full((48, 64), 2.0), weather=weather).rgb
 
     wet = Weather(lens_drops=0.3, seed=3)
     whole = picture(everything, wet)
@@ -88,31 +75,22 @@ def test_ideal_is_the_default_and_reaches_every_exposure() -> None:
     assert "ideal" in preset_names(PRESETS)
     assert ImagePipeline() == ImagePipeline(preset="ideal")
 
-    photo = develop(take_shot(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng()))
+    ideal = photo(speckled())
 
     expected = to_bytes(display_values(speckled().astype(np.float64) / WHITE_CD_M2, "filmic"))
-    assert np.abs(photo.rgb.astype(int) - expected).max() <= 1
-    assert photo.ev100 == 8.0
+    assert np.abs(ideal.rgb.astype(int) - expected).max() <= 1
+    assert ideal.ev100 == 8.0
 
-    night = np.full((48, 64, 3), 0.25 * 1.2 * 2.0**-9, np.float32)
-    camera = Camera("eye", SE3(), LENS, ev100=-9.0)
-
-    ideal = develop(
-        take_shot(night, None, camera, Weather(), ImagePipeline(tone="srgb"), rng())
-    ).rgb
-
-    # IEC 61966-2-1: a quarter of white is byte 137.
-    assert (ideal == 137).all()
+    # IEC 61966-2-1: a quarter of white is byte 137, also at night.
+    night = np.full((48, 64, 3), 0.25 * 1.2 * 2.0**-9)
+    assert (photo(night, made(tone="srgb"), replace(EYE, ev100=-9.0)).rgb == 137).all()
 
 
 def test_exposure_compensation_is_in_stops() -> None:
     """+1 stop shows half the luminance in the same tone."""
-    pushed = ImagePipeline.model_validate_json('{"exposure_compensation_ev": 1.0}')
+    brighter = photo(0.5 * speckled(), made(exposure_compensation_ev=1.0)).rgb
 
-    plain = develop(take_shot(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng())).rgb
-    brighter = develop(take_shot(0.5 * speckled(), None, CAMERA, Weather(), pushed, rng())).rgb
-
-    np.testing.assert_array_equal(plain, brighter)
+    np.testing.assert_array_equal(photo(speckled()).rgb, brighter)
 
 
 def test_glare_ends_where_the_lens_shows_nothing() -> None:
@@ -120,10 +98,9 @@ def test_glare_ends_where_the_lens_shows_nothing() -> None:
     lens = Lens("kannala_brandt", (0.0,) * 4, half_field_rad=0.6)
     camera = Camera("eye", SE3(), Intrinsics(96, 96, 40.0, 40.0, 48.0, 48.0, lens), ev100=8.0)
     dark = np.isnan(camera.intrinsics.pixel_rays()[..., 0])
-    radiance = np.where(dark[..., None], 0.0, speckled(96, 96)).astype(np.float32)
-    veiled = ImagePipeline.model_validate_json('{"glare": 0.1}')
+    radiance = np.where(dark[..., None], 0.0, speckled(96, 96))
 
-    rgb = develop(take_shot(radiance, None, camera, Weather(), veiled, rng())).rgb
+    rgb = photo(radiance, made(glare=0.1), camera).rgb
 
     assert 0.2 < dark.mean() < 0.9
     assert not rgb[dark].any()
@@ -136,7 +113,7 @@ def test_renderers_are_asked_for_radiance_and_only_for_the_depth_that_is_needed(
 
     def captured(*channels: Channel) -> SensorReading:
         return capture_photograph(
-            Scene("t"), renderer, CAMERA, frozenset(channels), ImagePipeline(), rng()
+            Scene("t"), renderer, EYE, frozenset(channels), ImagePipeline(), rng()
         )
 
     reading = captured(Channel.RGB, Channel.INSTANCE)
@@ -151,8 +128,7 @@ def test_renderers_are_asked_for_radiance_and_only_for_the_depth_that_is_needed(
 def test_radiance_is_left_as_it_was() -> None:
     radiance = speckled()
     kept = radiance.copy()
-    pipeline = ImagePipeline.model_validate_json('{"preset": "webcam", "focus": null}')
-    develop(take_shot(radiance, None, CAMERA, Weather(lens_drops=0.2), pipeline, rng()))
+    photo(radiance, made(preset="webcam", focus=None), weather=Weather(lens_drops=0.2))
     assert np.array_equal(radiance, kept)
 
 
@@ -207,9 +183,8 @@ def test_cameras_of_a_rig_share_the_settings_of_one() -> None:
 
     A name that no camera has is refused.
     """
-    left = Camera("left", SE3(), LENS, ev100=8.0)
-    scene = Scene("t", cameras=(left, Camera("right", SE3(), LENS, ev100=8.0)))
-    drawn = ImagePipeline.model_validate_json('{"exposure_error_ev": {"uniform": [-3, 0]}}')
+    scene = Scene("t", cameras=tuple(replace(EYE, name=name) for name in ("left", "right")))
+    drawn = made(exposure_error_ev={"uniform": [-3, 0]})
     grey = Recorder(np.full((48, 64, 3), 0.2 * WHITE_CD_M2, np.float32))
 
     def level(name: str, settings_of: str = "") -> float:

@@ -1,6 +1,6 @@
 """Images that are reduced from a larger photograph: against the mean of that photograph."""
 
-import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,19 +9,15 @@ import pytest
 from gen_data.core.asset_types import Material
 from gen_data.core.capture import Channel
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.scene import Body, Camera, Scene, Weather
+from gen_data.core.scene import Body, Camera, Scene
 from gen_data.core.se3 import SE3
 from gen_data.core.streams import Streams
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
-from gen_data.sensors.camera.image_pipeline import (
-    ImagePipeline,
-    capture_photograph,
-    develop,
-    take_shot,
-)
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 from gen_data.sensors.camera.image_sensor import ImageSensor, expose, expose_colors
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh
+from tests.sensors.camera.photographs import EYE, made, photo
 
 SIDE = 4
 SENSOR = ImageSensor(full_well_e=1000.0, prnu=0.02, dsnu_e=4.0, bits=10)
@@ -69,7 +65,7 @@ def pipeline(**given: Any) -> ImagePipeline:
         "blur_px": 1.2, "chromatic_aberration_px": 2.0, "image_sensor": {"full_well_e": 20000},
         "focus": {"distance_m": 1.0, "pixel_um": 30}, "tone": "knee", "white_balance": 0.5,
     }  # fmt: skip
-    return ImagePipeline.model_validate_json(json.dumps({**stages, **given}))
+    return made(**{**stages, **given})
 
 
 def test_a_reduced_photograph_is_the_mean_of_the_larger_one() -> None:
@@ -81,16 +77,14 @@ def test_a_reduced_photograph_is_the_mean_of_the_larger_one() -> None:
     radiance = (100.0 * 2.0 ** (1.5 * waves)).astype(np.float32)
     depth_m = np.where(x < 0.5, 1.0, 4.0)
 
-    def photo(image: np.ndarray, depth: np.ndarray, lens: Intrinsics, **given: Any) -> np.ndarray:
-        camera = Camera("eye", SE3(), lens, ev100=8.0)
-        rgb = develop(
-            take_shot(image.astype(np.float32), depth, camera, Weather(), pipeline(**given), rng())
-        ).rgb
+    def shown(image: np.ndarray, depth: np.ndarray, lens: Intrinsics, **given: Any) -> np.ndarray:
+        camera = replace(EYE, intrinsics=lens)
+        rgb = photo(image, pipeline(**given), camera, depth_m=depth, stream=rng()).rgb
         return rgb.astype(np.float64)
 
-    expected = block_means(photo(radiance, depth_m, large))
-    reduced = photo(block_means(radiance), depth_m[::SIDE, ::SIDE], small, reduction=SIDE)
-    whole = photo(block_means(radiance), depth_m[::SIDE, ::SIDE], small)
+    expected = block_means(shown(radiance, depth_m, large))
+    reduced = shown(block_means(radiance), depth_m[::SIDE, ::SIDE], small, reduction=SIDE)
+    whole = shown(block_means(radiance), depth_m[::SIDE, ::SIDE], small)
 
     inner = np.s_[4:-4, 4:-4]
     error = np.abs(reduced - expected)[inner]
@@ -116,7 +110,7 @@ def window_in_a_wall() -> tuple[Scene, FakeLibrary]:
 
 
 def looking_along_z(width_px: int, height_px: int) -> Camera:
-    return Camera("eye", SE3(), Intrinsics.from_hfov(width_px, height_px, 1.0), ev100=8.0)
+    return replace(EYE, intrinsics=Intrinsics.from_hfov(width_px, height_px, 1.0))
 
 
 def test_edges_of_what_saturates_are_those_of_the_reduced_photograph() -> None:
@@ -125,14 +119,14 @@ def test_edges_of_what_saturates_are_those_of_the_reduced_photograph() -> None:
     renderer = WarpRenderer(library, "cpu", RenderSettings(antialias=8))
     rgb = frozenset({Channel.RGB})
 
-    def photo(camera: Camera, **given: Any) -> np.ndarray:
+    def shown(camera: Camera, **given: Any) -> np.ndarray:
         settings = ImagePipeline.model_validate({"tone": "srgb", **given})
         reading = capture_photograph(scene, renderer, camera, rgb, settings, rng())
         return reading.channels[Channel.RGB].astype(np.float64)
 
-    expected = block_means(photo(looking_along_z(80 * 8, 60 * 8)), 8)
-    reduced = photo(looking_along_z(80, 60), reduction=8.0)
-    plain = photo(looking_along_z(80, 60))
+    expected = block_means(shown(looking_along_z(80 * 8, 60 * 8)), 8)
+    reduced = shown(looking_along_z(80, 60), reduction=8.0)
+    plain = shown(looking_along_z(80, 60))
 
     partly = (expected > expected.min() + 5.0) & (expected < 250.0)
     assert partly.sum() > 100

@@ -29,7 +29,7 @@ def test_drops_hide_their_share_of_the_lens_and_rain_in_the_air_nothing() -> Non
 
 
 def test_a_drop_shows_the_scene_upside_down() -> None:
-    """White above black: within a drop of 20 px, black above white; beside it nothing changes."""
+    """White above black: within a drop of 20 px, black above white; around it nothing changes."""
     image = np.zeros((200, 300, 3), np.float32)
     image[:100] = 1.0
 
@@ -66,7 +66,7 @@ def test_glare_moves_light_makes_none_and_leaves_its_input() -> None:
 
 
 def test_glare_is_enlarged_bilinearly() -> None:
-    """As OpenCV does it, in images of any size, and mixed with what arrives straight."""
+    """As OpenCV does it, in images of any size, and mixed with light that arrives straight."""
     for height, width in ((64, 96), (50, 67), (3, 9)):
         rng = Streams(seed=1, scene=0).rng("image")
         image = rng.uniform(0.0, 9.0, (height, width, 3)).astype(np.float32)
