@@ -10,7 +10,7 @@ from gen_data.annotations.annotate import Thresholds, annotate_ego, annotate_rea
 from gen_data.annotations.bev_map import BevMap, level_pose
 from gen_data.annotations.boxes3d import Boxes3d
 from gen_data.annotations.free_space import FreeSpace
-from gen_data.annotations.lanes import Lanes
+from gen_data.annotations.lanes import Lanes, is_seen
 from gen_data.annotations.motion import Motion
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.errors import ConfigError
@@ -124,6 +124,32 @@ def test_points_behind_a_car_are_listed_and_hidden() -> None:
             assert visible is not covered or (visible and 16.0 < depth < 21.0)
             hidden += not visible
     assert hidden > 5
+
+
+def test_ground_far_down_a_steep_street_is_visible_and_a_wall_before_it_hides_it() -> None:
+    """A plane that falls by 12 % from 1.6 m below the camera; rows of pixels show it 8 m apart.
+
+    A wall of 1 m across it, 40 m ahead, hides the ground behind it.
+    """
+    lens = Intrinsics.from_hfov(160, 96, hfov_rad=1.2)
+    camera = Camera("eye", RIG_AXES.inverse(), lens)
+    rays = lens.pixel_rays()
+    ground_m = 1.6 / np.maximum(rays[..., 1] - 0.12 * rays[..., 2], 1e-9)
+    wall_m = 40.0 / rays[..., 2]
+    below_top = rays[..., 1] * wall_m > 1.6 + 0.12 * 40.0 - 1.0
+    ahead_m = np.arange(8.0, 100.0, 0.5)
+    p_camera = np.stack([0.1 * ahead_m, 1.6 + 0.12 * ahead_m, ahead_m], axis=1)
+    uv = lens.project(p_camera)
+
+    def seen_in(range_m: Array) -> Array:
+        reading = SensorReading("eye", camera, {Channel.RANGE: range_m.astype(np.float32)})
+        return is_seen(reading, p_camera, uv)
+
+    assert seen_in(np.where(ground_m < 1e6, ground_m, np.inf)).all()
+    walled = seen_in(np.where(below_top, np.minimum(ground_m, wall_m), ground_m))
+    assert walled[ahead_m < 39.0].all()
+    # At 75 m, the ground is half a pixel below the top of the wall.
+    assert not walled[(ahead_m > 44.0) & (ahead_m < 75.0)].any()
 
 
 def test_free_space_is_the_carriageway_that_nothing_stands_on() -> None:
