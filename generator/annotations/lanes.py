@@ -93,7 +93,7 @@ def is_seen(reading: SensorReading, p_camera: Array, uv: Array) -> NDArray[np.bo
     ranges_m = reading.channels[Channel.RANGE]
     height, width = ranges_m.shape
     columns, rows = (uv[:, k].astype(np.intp) for k in (0, 1))
-    range_m = np.maximum(ranges_m[rows, columns], 1.0 / _interpolate(1.0 / ranges_m, uv))
+    range_m = np.maximum(ranges_m[rows, columns], _range_between(ranges_m, uv))
     away_m = np.sqrt((p_camera * p_camera).sum(axis=1))
     first_hit = p_camera * (np.minimum(range_m, away_m) / away_m)[:, None]
     above_m = reading.camera.T_world_camera.rotate(first_hit - p_camera)[:, 2]
@@ -106,15 +106,18 @@ def is_seen(reading: SensorReading, p_camera: Array, uv: Array) -> NDArray[np.bo
     return np.asarray((above_m < OCCLUDER_MIN_M) & (beyond_m > NEARER * away_m))
 
 
-def _interpolate(values: NDArray[np.float32], uv: Array) -> Array:
-    """Values [h, w] of pixels at image coordinates [n, 2], bilinear between their centres; > 0."""
-    height, width = values.shape
+def _range_between(ranges_m: NDArray[np.float32], uv: Array) -> Array:
+    """Ranges [n] at image coordinates [n, 2], whose inverse is bilinear between centres of pixels.
+
+    At most 1e9 m.
+    """
+    height, width = ranges_m.shape
     low, share = np.divmod(uv - 0.5, 1.0)
     column, row = low.T.astype(np.intp)
     x, y = share.T
-    found = np.full(len(uv), 1e-9)
+    inverse = np.full(len(uv), 1e-9)
     for down, by_row in ((0, 1.0 - y), (1, y)):
         for right, by_column in ((0, 1.0 - x), (1, x)):
             at = np.clip(row + down, 0, height - 1), np.clip(column + right, 0, width - 1)
-            found += by_row * by_column * values[at]
-    return found
+            inverse += by_row * by_column / ranges_m[at]
+    return 1.0 / inverse
