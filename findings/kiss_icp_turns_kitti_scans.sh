@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Common guess: the KITTI loader of KISS-ICP returns the points of sequences/NN/velodyne/*.bin, as its
 #   other loaders return the points of their files.
-# What happens: it turns every point upwards by 0.205 degrees, about an axis of its own: a correction of
+# Behaviour: it turns every point upwards by 0.205 degrees, each in its vertical plane: a correction of
 #   the calibration of the scanner of KITTI's car. The loader kitti-raw does the same. No option turns
 #   it off, and neither help nor output mentions it; only a comment in the source does.
 # Why it matters: the format is used by SemanticKITTI, by simulators and by recordings with other
-#   scanners. A wall at 50 m is 18 cm too high, flat ground becomes a bowl, and poses, maps and errors are
-#   those of scans that nobody recorded: for such data, write PLY or PCD files and use the loader generic.
+#   scanners. A wall at 50 m is 18 cm too high, flat ground becomes a bowl, and poses, maps and errors
+#   belong to scans that nobody recorded: for such data, write PLY or PCD files and use the loader generic.
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
