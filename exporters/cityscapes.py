@@ -22,7 +22,9 @@ instant in it.
   or that are below the thresholds; evaluation leaves groups out.
 * **Ignored** objects are ``unlabeled``.
 * **Polygons** run through the centres of pixels, larger ones first: drawn by cityscapesscripts
-  they give ``labelIds`` again. An object in several parts has several polygons.
+  they give ``labelIds`` again. An object in several parts has several polygons, which
+  cityscapesscripts' ``json2instanceImg`` and detectron2's loader with ``from_json=True`` (its
+  default) take for objects: ``instanceIds`` has one number per object.
 * **Calibration**: the focal length in pixels, the principal point with pixel centres at whole
   numbers, and the pose on the rig (X forward, Y left, Z up; yaw, pitch, roll in radians, applied in
   this order; positive pitch looks down); zero without a rig.

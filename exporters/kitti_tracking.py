@@ -11,9 +11,10 @@
 A frame is an instant at which camera 02 reads, numbered without gaps: after a frame that is
 missing, another sequence starts, numbered behind all views. Labels have 17 columns,
 separated by blanks: ``frame track_id type truncated occluded alpha left top right bottom h w l x y
-z rotation_y``. They equal the rows of the exporter ``kitti``, but ``track_id`` is the instance id
-(-1 for DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as in KITTI's
-evaluation code. X of the points is ahead of camera 02 (``gen_data.exporters.velodyne``).
+z rotation_y``. They equal the rows of the exporter ``kitti``, but objects without laser points keep
+their labels, ``track_id`` is the instance id (-1 for DontCare), ``truncated`` is 0, 1 or 2, and
+sitting people are ``Person``, as in KITTI's evaluation code. X of the points is ahead of camera 02
+(``gen_data.exporters.velodyne``).
 
 Reference: Geiger et al., "Are we ready for Autonomous Driving?", CVPR 2012, and the readme of the
 tracking development kit; TrackEval reads the folder ``training`` as it is.

@@ -84,7 +84,7 @@ def motion_at(scene: Scene, rig: str, time_s: float) -> RigMotion:
     if track is None:
         return RigMotion(pose, STILL)
     origin_m = track.pose(time_s).rounded().translation_m
-    return carried_motion(pose, origin_m, track.twist(time_s))
+    return carried_motion(pose, origin_m, track, time_s)
 
 
 def stamped(

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gen_data.core import errors, se3
-from gen_data.core.motion import STILL, Twist
+from gen_data.core.motion import STILL, Trajectory, Twist
 from gen_data.core.reported import reported
 from gen_data.core.scene import Scene
 from gen_data.exporters.sequences import Mount, mounted_pose
@@ -87,16 +87,24 @@ def rig_motion(scene: Scene, mount: Mount) -> RigMotion:
     if rig is None or track is None:
         return RigMotion(pose, STILL)
     origin_m = scene.body(rig.body).T_world_body.translation_m
-    return carried_motion(pose, origin_m, track.twist(scene.time_s))
+    return carried_motion(pose, origin_m, track, scene.time_s)
 
 
-def carried_motion(pose: se3.SE3, origin_m: se3.Vec3, twist: Twist) -> RigMotion:
-    """Motion of a frame on a body whose origin has a twist: the lever arm's part is added."""
+def carried_motion(
+    pose: se3.SE3, origin_m: se3.Vec3, track: Trajectory, time_s: float
+) -> RigMotion:
+    """Motion of a frame on a body at an instant of its trajectory.
+
+    With the lever arm r of the frame, the velocity is ``v + w x r`` and the acceleration
+    ``a + dw/dt x r + w x (w x r)``.
+    """
+    twist = track.twist(time_s)
     arm_m = np.subtract(pose.translation_m, origin_m)
     turning = np.array(twist.angular_velocity_rad_s)
     swing_m_s = np.cross(turning, arm_m)
     velocity = np.add(twist.velocity_m_s, swing_m_s)
-    acceleration = np.add(twist.acceleration_m_s2, np.cross(turning, swing_m_s))
+    inward = np.cross(turning, swing_m_s) + np.cross(track.angular_acceleration(time_s), arm_m)
+    acceleration = np.add(twist.acceleration_m_s2, inward)
     vx, vy, vz = (float(v) for v in velocity)
     ax, ay, az = (float(v) for v in acceleration)
     return RigMotion(pose, Twist((vx, vy, vz), (ax, ay, az), twist.angular_velocity_rad_s))

@@ -19,7 +19,8 @@ all steps follow one another.
 
 ``geometry`` adds PNG files of 16 bits, ``observation/{depth,instance}/<camera>``, and the arrays of
 ``lerobot`` by the same names without ``annotation.``, slashes for dots; ``metadata.json`` has the
-shape of an array, the unit of depths and the names of numbered predicates.
+shape of an array and the names of its columns, the unit of depths and the names of numbered
+predicates.
 
 Reference: Ramos et al., RLDS: an ecosystem to generate, share and use datasets in reinforcement
 learning, 2021 (names and meaning of the keys of a step). ``tfds.builder_from_directory`` reads a
@@ -192,6 +193,9 @@ def _describe(
         for key, values in features.items()
     }
     more: dict[str, dict[str, Any]] = {key: {"shape": [*a.shape]} for key, a in arrays.items()}
+    for key, array in arrays.items():
+        if array.names:
+            more[key]["names"] = [*array.names]
     more |= {key: {"shape": [lengths[key]]} for key in FLOATS if key in lengths}
     for camera, sums in first["images"].items():
         more[f"steps/observation/image/{camera}"] = {"shape": [*reversed(sums["size_px"]), 3]}

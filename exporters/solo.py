@@ -25,7 +25,7 @@ References: SOLO's schema in the documentation of Unity's Perception package 1.0
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -34,17 +34,17 @@ import numpy as np
 from gen_data.core import errors, intrinsics
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.motion import STILL, Twist
+from gen_data.core.motion import Twist
 from gen_data.core.reported import reported
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Camera, Scene
-from gen_data.core.scene_time import rig_twist
 from gen_data.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
 from gen_data.exporters import base, fragments, image_files, label_png
 from gen_data.exporters.conventions import EDGES, PINHOLE, READING, Conventions
 from gen_data.exporters.id_colors import id_color, id_colors
+from gen_data.exporters.oxts import rig_motion
 from gen_data.exporters.sensor_selection import check_pinholes, rgb_camera, rgb_cameras, stamp_s
-from gen_data.exporters.sequences import frame_facts, write_bytes, write_json
+from gen_data.exporters.sequences import camera_mount, frame_facts, write_bytes, write_json
 
 FORMAT_VERSION = "1.0.0-preview.1"
 """Version of Unity's Perception package whose schema the files follow."""
@@ -273,10 +273,7 @@ def _box3d(thing: ObjectTruth, T_world_camera: SE3) -> dict[str, Any]:
 
 def _camera_twist(scene: Scene, camera: Camera) -> Twist:
     """Motion of a camera over the ground; it stands still without a rig."""
-    for rig in scene.rigs:
-        if rig.name == camera.rig:
-            return rig_twist(scene, replace(rig, T_body_rig=rig.T_body_rig @ camera.T_rig_camera))
-    return STILL
+    return rig_motion(scene, camera_mount(scene, camera.name, true=True)).twist
 
 
 def _projection(camera: intrinsics.Intrinsics) -> list[float]:

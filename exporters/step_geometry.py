@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from gen_data.core import demonstrations, se3
 from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.lens import COEFFICIENTS
 from gen_data.core.reported import reported
 from gen_data.core.sample import Predicate, Sample
 from gen_data.exporters.image_files import read_pixels
@@ -59,10 +61,23 @@ TABLES: Mapping[str, Mapping[str, Array]] = {
 }
 """Arrays with a row per object, contact or relation; predicates count from 0 in ``PREDICATES``."""
 _CAMERA = {"K": (3, 3), "T_world_camera": (4, 4)}
+_LENSES = {len(names): names for names in COEFFICIENTS.values()}
+"""Names of the coefficients of a lens by their number, which differs from model to model."""
 
 
 def check(info: DatasetInfo, parts: Sequence[Part], cameras: Sequence[str], exporter: str) -> None:
-    """Reject parts that the cameras do not see. Raises ConfigError if a camera lacks a channel."""
+    """Reject parts that the cameras do not see, or whose lenses no matrix describes.
+
+    Raises:
+        ConfigError: a camera lacks a channel, or the calibration of a panorama is asked for.
+    """
+    for camera in cameras if "calibration" in parts else ():
+        if info.sensor(camera).lens == "equirectangular":
+            raise ConfigError(
+                f"exporter '{exporter}': camera '{camera}' has a lens of the model "
+                "'equirectangular', which K does not describe; leave 'calibration' out of the "
+                "exporter's geometry, or list the others in its cameras"
+            )
     for part, channel in IMAGES.items():
         remedy = f", or leave '{part}' out of the exporter's geometry"
         for camera in cameras if part in parts else ():
@@ -126,7 +141,7 @@ def array_features(
                 for name, shape in _CAMERA.items():
                     found[f"annotation.{name}.{camera}"] = Array("float32", shape)
                 if (bent := f"annotation.distortion.{camera}") in most:
-                    found[bent] = Array("float32", (most[bent],))
+                    found[bent] = Array("float32", (most[bent],), _LENSES[most[bent]])
     return found
 
 

@@ -119,6 +119,21 @@ class Trajectory:
             self._angular_velocity(k + f),
         )
 
+    def angular_acceleration(self, time_s: float) -> se3.Vec3:
+        """Angular acceleration [rad/s^2] at an instant, outer axes; 0 outside the knots.
+
+        The change of the angular velocity over a step around the instant, within the knots.
+        """
+        if not self.start_s <= time_s <= self.end_s or self.end_s == self.start_s:
+            return (0.0, 0.0, 0.0)
+        first_s = max(time_s - 0.5 * self.step_s, self.start_s)
+        last_s = min(time_s + 0.5 * self.step_s, self.end_s)
+        before, after = (
+            self._angular_velocity((t - self.start_s) / self.step_s) for t in (first_s, last_s)
+        )
+        x, y, z = ((b - a) / (last_s - first_s) for a, b in zip(before, after, strict=True))
+        return (x, y, z)
+
     def _acceleration(self, steps: float) -> se3.Vec3:
         """Acceleration [m/s^2] after a number of steps, from second differences at knots."""
         inner = len(self.knots) - 2

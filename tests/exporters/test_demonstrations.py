@@ -15,6 +15,8 @@ from PIL import Image
 
 from gen_data.core.capture import Channel
 from gen_data.core.demonstrations import demonstration_step
+from gen_data.core.errors import ConfigError
+from gen_data.core.lens import Lens
 from gen_data.core.sample import EgoTruth, Relation
 from gen_data.core.scene import Assignment, ContactSpan, Episode, Span
 from gen_data.core.se3 import SE3
@@ -218,6 +220,45 @@ def test_geometry_of_every_step_is_in_lerobot_as_arrays(
     for name, feature in features.items():
         if feature["dtype"] not in ("image", "string"):
             assert np.shape(rows[0][name]) in ((tuple(feature["shape"])), ()), name
+
+
+CALIBRATED = [LeRobot(geometry=("calibration",)), Rlds(geometry=("calibration",))]
+
+
+@pytest.mark.parametrize("model", ["brown_conrady", "kannala_brandt"])
+@pytest.mark.parametrize("exporter", CALIBRATED)
+def test_coefficients_of_bent_lenses_have_the_names_that_tell_the_model(
+    exporter: Any, model: Any, world: Any, related: Any, tmp_path: Path
+) -> None:
+    """OpenCV: calib3d has k1 k2 p1 p2 k3 k4 k5 k6, fisheye has k1 k2 k3 k4."""
+    names = {"brown_conrady": "k1 k2 p1 p2 k3 k4 k5 k6", "kannala_brandt": "k1 k2 k3 k4"}[model]
+    count = len(names.split())
+    lens = Lens(model, tuple(0.001 * (k + 1) for k in range(count)), half_field_rad=1.2)
+
+    def bent(truth: Any) -> Any:
+        k = replace(truth.camera.intrinsics, lens=lens)
+        return replace(truth, camera=replace(truth.camera, intrinsics=k))
+
+    given = [replace(s, truth={n: bent(t) for n, t in s.truth.items()}) for s in related]
+    info = drive_info(world)
+    sensors = tuple(replace(s, lens=model) if s.name in info.cameras else s for s in info.sensors)
+    folder = world.export(exporter, replace(info, sensors=sensors), given, tmp_path)
+    folder = folder / "train/toys_arm"
+    if exporter.type == "lerobot":
+        features = json.loads((folder / "meta/info.json").read_text())["features"]
+        found = features["annotation.distortion.left"]
+    else:
+        found = json.loads((folder / "metadata.json").read_text())["steps/distortion/left"]
+    assert (found["names"], found["shape"]) == (names.split(), [count])
+
+
+@pytest.mark.parametrize("exporter", CALIBRATED)
+def test_no_matrix_stands_for_a_panorama(exporter: Any, world: Any) -> None:
+    info = drive_info(world)
+    panorama = replace(info.sensor("left"), lens="equirectangular")
+    sensors = tuple(panorama if s.name == "left" else s for s in info.sensors)
+    with pytest.raises(ConfigError, match="'equirectangular', which K does not describe"):
+        exporter.check(replace(info, sensors=sensors))
 
 
 def test_geometry_of_every_step_is_in_rlds_as_lists_and_images(related: Any, export: Any) -> None:

@@ -16,6 +16,7 @@ from gen_data.core.scene import Device
 from gen_data.core.scene_time import scene_at
 from gen_data.core.se3 import SE3
 from gen_data.exporters.kitti_raw import KittiRaw
+from gen_data.exporters.nuscenes_can_bus import motion_at
 from gen_data.exporters.oxts import (
     GRAVITY_M_S2,
     RigMotion,
@@ -102,6 +103,32 @@ def test_a_pose_without_motion_is_where_the_rig_stands(world: Any, tmp_path: Pat
     row = (folder / DRIVE.format(2) / "oxts/data/0000000000.txt").read_text().split()
     assert float(row[2]) == pytest.approx(1.6)
     assert float(row[8]) == 0.0
+
+
+def test_a_lever_arm_feels_the_growth_of_a_turn() -> None:
+    """On a clothoid, 2 m ahead of the origin: a + dw/dt x r + w x (w x r), dw/dt = 0.2 rad/s^2.
+
+    Goldstein, Classical Mechanics, 4.10. The rows, the CAN bus and the positions, differentiated
+    twice, agree.
+    """
+    unit_s = math.sqrt(math.pi / 0.2)
+
+    def clothoid(t: float) -> SE3:
+        sine, cosine = fresnel(t / unit_s)
+        return SE3.about_z(0.1 * t * t, (10.0 * unit_s * cosine, 10.0 * unit_s * sine, 0.0))
+
+    ahead = SE3((2.0, 0.0, 0.0))
+    drive = driving(clothoid, seconds=1.0)
+    (rig,) = drive.rigs
+    on_rig = replace(drive, rigs=(replace(rig, T_body_rig=rig.T_body_rig @ ahead),))
+    for k in range(1, 10):
+        time_s = round(0.1 * k, 6)
+        motion = rig_motion(scene_at(drive, time_s), Mount("ego", ahead))
+        row = np.array(oxts_row(motion, (0.0, 0.0)).split(), float)
+        turn = 0.2 * time_s
+        assert row[[14, 15]] == pytest.approx([-2.0 * turn**2, 10.0 * turn + 0.4], abs=0.03), k
+        force = motion_at(on_rig, "ego", time_s).twist.acceleration_m_s2
+        assert force == pytest.approx(motion.twist.acceleration_m_s2, abs=1e-6)
 
 
 def test_navigation_in_a_growing_turn_is_that_of_its_instant() -> None:
