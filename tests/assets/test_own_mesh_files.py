@@ -17,6 +17,7 @@ from gen_data.assets.library import Library, open_library
 from gen_data.assets.readers import read_mesh
 from gen_data.core.asset_types import Material
 from gen_data.core.errors import AssetError
+from tests.assets.step_box import METRE, step_box
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 RED = "newmtl red\nKd 1 0 0\n"
@@ -334,8 +335,30 @@ def test_3mf_builds_components_in_their_unit_with_their_colours(tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_step_is_meshed_in_metres(tmp_path: Path) -> None:
-    """A file without a shape is one clear error."""
+@pytest.mark.parametrize(("text", "metres"), [
+    (step_box((10, 20, 30), color=(1.0, 0.5, 0.0)), 0.001),
+    (step_box((10, 20, 30), METRE), 1.0),
+    (step_box((10, 20, 30), inch=True), 0.0254),
+])  # fmt: skip
+def test_step_is_meshed_in_metres_with_its_axes_and_colours(
+    tmp_path: Path, text: str, metres: float
+) -> None:
+    """A box of 10 x 20 x 30 units, Z up, turned outwards; sRGB 0.5 is 0.214041 linear."""
+    pytest.importorskip("cascadio")
+    (tmp_path / "a.step").write_text(text)
+    soup = read_mesh(Folder(tmp_path), "a.step").soup
+    points = soup.corners.reshape(-1, 3)
+    np.testing.assert_allclose(points.min(axis=0), 0.0, atol=1e-9)
+    np.testing.assert_allclose(points.max(axis=0), metres * np.array([10, 20, 30]), rtol=1e-6)
+    a, b, c = np.moveaxis(soup.corners, 1, 0)
+    assert (a * np.cross(b, c)).sum() / 6.0 == pytest.approx(6000.0 * metres**3, rel=1e-5)
+    if "COLOUR_RGB" in text:
+        (slot,) = soup.slots
+        assert slot.material.base_color == pytest.approx((1.0, 0.214041, 0.0), abs=1e-5)
+
+
+@pytest.mark.slow
+def test_a_step_file_without_a_shape_is_one_clear_error(tmp_path: Path) -> None:
     pytest.importorskip("cascadio")
     (tmp_path / "a.step").write_text(
         "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n"
