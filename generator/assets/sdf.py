@@ -105,13 +105,14 @@ class _Scope:
 class _Placement:
     """Where an included model is: pose of its frame ``placed`` (empty = its own) in ``frame``.
 
-    ``model`` is the name that its own frame gets.
+    ``model`` is the name that its own frame gets, ``held`` whether its joints do not move.
     """
 
     model: str = _MODEL
     frame: str = ""
     pose: SE3 = field(default_factory=SE3)
     placed: str = ""
+    held: bool = False
 
 
 _Shapes = tuple[tuple[Shape, str], ...]
@@ -169,7 +170,7 @@ class _Reader:
             raise ValueError(f"models inside models, more than {_MAX_DEPTH} deep")
         self.frames[scope.frame] = (placement.frame, placement.pose)
         before = len(self.links)
-        held = (model.findtext("static") or "").strip() in ("true", "1")
+        held = placement.held or _is_static(model)
         for element in model:
             self.remarks[element.tag] += element.tag in _UNUSED
             try:
@@ -191,7 +192,7 @@ class _Reader:
 
     def _add_part(self, element: Element, scope: _Scope, *, held: bool) -> None:
         if element.tag == "include":
-            self._include(element, scope)
+            self._include(element, scope, held=held)
             return
         if element.tag not in ("link", "joint", "frame", "model"):
             return
@@ -207,7 +208,7 @@ class _Reader:
             inside = replace(
                 scope, prefix=prefix, frame=prefix + _MODEL, depth=(*scope.depth, name)
             )
-            self._add_model(element, inside, _Placement(inside.frame, frame, pose))
+            self._add_model(element, inside, _Placement(inside.frame, frame, pose, held=held))
         elif element.tag == "link":
             self.frames[name] = self._pose(element, scope, scope.frame)
             visuals, collisions = (
@@ -226,7 +227,7 @@ class _Reader:
         else:
             self._add_joint(element, name, scope, held=held)
 
-    def _include(self, element: Element, scope: _Scope) -> None:
+    def _include(self, element: Element, scope: _Scope, *, held: bool) -> None:
         """Add an included model, with ``merge`` as if its parts were this model's own."""
         file = self._model_file(scope.file, element)
         if file in scope.depth:
@@ -239,7 +240,8 @@ class _Reader:
         model = f"{prefix}_merged__{name}__model__" if merged else prefix + _MODEL
         frame, pose = self._pose(element, scope, scope.frame)
         placed = (element.findtext("placement_frame") or "").strip()
-        self.add_file(file, prefix, scope.depth, _Placement(model, frame, pose, placed))
+        held = held or _is_static(element)
+        self.add_file(file, prefix, scope.depth, _Placement(model, frame, pose, placed, held))
 
     def _model_file(self, file: str, include: Element) -> str:
         """SDF file of an included model: the folder's ``model.config`` names it."""
@@ -476,6 +478,11 @@ class _Reader:
 _X: Vec3 = (1.0, 0.0, 0.0)
 _EXTENTS = {"box": 3, "cylinder": 2, "capsule": 1, "sphere": 1, "ellipsoid": 3}
 """Number of sizes that must not be 0."""
+
+
+def _is_static(element: Element) -> bool:
+    """Whether a model, or an included one, does not move, nor any of its joints."""
+    return (element.findtext("static") or "").strip().lower() in _TRUE
 
 
 def _parse_pose(pose: Element) -> SE3:

@@ -201,6 +201,23 @@ def test_models_are_merged_placed_by_a_frame_and_found_by_their_bare_names(tmp_p
     assert middle(read_sdf(Folder(tmp_path), "robot/model.sdf"), "palm") == [0.0, 0.0, 1.0]
 
 
+@pytest.mark.parametrize(("outer", "inner", "moves"), [
+    ("", "", True), ("<static>true</static>", "", False), ("", "<static>1</static>", False),
+])  # fmt: skip
+def test_joints_of_models_inside_static_ones_do_not_move(
+    tmp_path: Path, outer: str, inner: str, moves: bool
+) -> None:
+    """Of a model in the file and of one that is included."""
+    (tmp_path / "door").mkdir()
+    (tmp_path / "door/model.sdf").write_text(
+        f'<sdf version="1.9"><model name="door">{"".join(HINGED)}</model></sdf>'
+    )
+    include = f"<include><uri>model://door</uri><name>a</name>{inner}</include>"
+    nested = f'<model name="b">{inner}{"".join(HINGED)}</model>'
+    described = read(tmp_path, outer, include, nested)
+    assert [joint.movable for joint in described.joints if "hinge" in joint.name] == [moves] * 2
+
+
 def test_before_version_1_7_a_joint_may_have_the_name_of_its_link(tmp_path: Path) -> None:
     joint = HINGED[2].replace('name="hinge"', 'name="door"')
     with pytest.raises(AssetError, match="joint 'door': its name is missing or used twice"):
