@@ -154,7 +154,7 @@ def _read_topology(mesh: Any, positions: Array, where: str) -> _Topology:
     fits = len(counts) and counts.min() >= 3 and counts.sum() == len(points)
     if not fits or points.min() < 0 or points.max() >= len(positions):
         raise AssetError(f"{where}: its faces and points are inconsistent; export it again")
-    fans, polygon = polygon_triangles.split_polygons(counts, positions[points])
+    fans, polygon = polygon_triangles.split_polygons(counts, positions, points)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         fans = fans[:, ::-1]
     seen = ~np.isin(polygon, np.array(mesh.GetHoleIndicesAttr().Get(time) or [], dtype=np.int64))

@@ -29,7 +29,7 @@ def in_space(flat: tuple[tuple[float, float], ...], first: int, *, tilted: bool 
 
 
 def triangles_of(points: Array) -> Array:
-    numbers, polygon = split_polygons(np.array([len(points)]), points)
+    numbers, polygon = split_polygons(np.array([len(points)]), points, np.arange(len(points)))
     assert (polygon == 0).all()
     return points[numbers]
 
@@ -68,7 +68,8 @@ def test_convex_polygons_are_fans_in_their_order_and_others_keep_theirs() -> Non
     tie = ((0, 0), (3, 3), (3, 0), (0, 1))
     flats = (square[:3], square, L[1:] + L[:1], square[:2], tie)
     points = np.concatenate([in_space(flat, 0) for flat in flats])
-    numbers, polygon = split_polygons(np.array([len(flat) for flat in flats]), points)
+    sizes = np.array([len(flat) for flat in flats])
+    numbers, polygon = split_polygons(sizes, points, np.arange(len(points)))
     assert np.bincount(polygon, minlength=5).tolist() == [1, 2, 4, 0, 2]
     assert (np.diff(polygon) >= 0).all()
     assert numbers[:3].tolist() == [[0, 1, 2], [3, 4, 5], [3, 5, 6]]
@@ -79,8 +80,27 @@ def test_degenerate_polygons_and_undefined_points_are_fans() -> None:
     line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 0, 0]])
     broken = np.full((4, 3), np.nan)
     for points in (line, broken):
-        numbers, _ = split_polygons(np.array([4]), points)
+        numbers, _ = split_polygons(np.array([4]), points, np.arange(4))
         assert numbers.tolist() == [[0, 1, 2], [0, 2, 3]]
-    numbers, polygon = split_polygons(np.zeros(0, np.int64), np.zeros((0, 3)))
+    numbers, polygon = split_polygons(
+        np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0, np.int64)
+    )
     assert numbers.shape == (0, 3)
     assert len(polygon) == 0
+
+
+def test_polygons_share_points_and_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Squares and Ls in a row, of points in any order, and of any number at a time."""
+    flats = [((0, 0), (1, 0), (1, 1), (0, 1)), L[3:] + L[:3], L[1:] + L[:1], star(5)] * 5
+    points = np.concatenate([in_space(flat, 0) for flat in flats])
+    order = np.random.default_rng(0).permutation(len(points))
+    sizes = np.array([len(flat) for flat in flats])
+    whole = split_polygons(sizes, points[order], np.argsort(order))
+    monkeypatch.setattr("gen_data.core.polygon_triangles._AT_ONCE", 3)
+    few = split_polygons(sizes, points[order], np.argsort(order))
+    np.testing.assert_array_equal(whole[0], few[0])
+    np.testing.assert_array_equal(whole[1], few[1])
+    found = points[whole[0]]
+    crosses = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+    areas = np.bincount(whole[1], weights=0.5 * np.sqrt((crosses**2).sum(axis=1)))
+    np.testing.assert_allclose(areas, [shapely.Polygon(flat).area for flat in flats])

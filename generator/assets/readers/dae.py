@@ -181,9 +181,11 @@ def _triangles(polygons: Any) -> Any:
     if not len(polygons.index):
         return polygons.triangleset()
     corners = np.asarray(polygons.vertex_index, np.int64)
-    points = _rows(polygons.vertex, corners)
+    points = np.asarray(polygons.vertex, np.float64)
+    if corners.min() < 0 or corners.max() >= len(points):
+        raise ValueError(f"an index out of range 0..{len(points) - 1}")
     sizes = np.asarray(polygons.vcounts, np.int64)
-    triangles, _ = polygon_triangles.split_polygons(sizes, points)
+    triangles, _ = polygon_triangles.split_polygons(sizes, points, corners)
     indices = np.ascontiguousarray(polygons.index[triangles]).reshape(-1)
     return TriangleSet(polygons.sources, polygons.material, indices, polygons.xmlnode)
 

@@ -160,8 +160,8 @@ def _build_soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup
         raise ValueError(f"more than {mesh_source.MAX_FACES} triangles")
     corners = _parse_indices(s.corners)
     positions, colors = _parse_positions(s.positions)
-    points = _look_up(positions, corners[:, 0], "vertex", required=True)
-    fans, polygon = polygon_triangles.split_polygons(sizes, points)
+    _check_range(positions, corners[:, 0], "vertex", required=True)
+    fans, polygon = polygon_triangles.split_polygons(sizes, positions, corners[:, 0] - 1)
     indices = corners[fans]
     texcoords = _parse_table(s.texcoords, 2, "vt")
     normals = _parse_table(s.normals, 3, "vn")
@@ -169,7 +169,7 @@ def _build_soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup
     if max(s.polygon_objects, default=0):
         groups, names = s.polygon_objects, s.object_names
     return TriangleSoup(
-        corners=points[fans],
+        corners=positions[indices[..., 0] - 1],
         uvs=_look_up(texcoords, indices[..., 1], "vt") if len(texcoords) else None,
         normals=_look_up(normals, indices[..., 2], "vn")
         if len(normals) and (indices[..., 2] > 0).all()
@@ -249,9 +249,13 @@ def _parse_table(lines: list[str], width: int, name: str) -> Float64:
     return table.reshape(-1, width)
 
 
-def _look_up(table: Float64, indices: Int64, name: str, *, required: bool = False) -> Float64:
+def _check_range(table: Float64, indices: Int64, name: str, *, required: bool = False) -> None:
     if (indices < 0).any() or (indices > len(table)).any() or (required and (indices < 1).any()):
         raise ValueError(f"a face with a {name} index out of range 1..{len(table)}")
+
+
+def _look_up(table: Float64, indices: Int64, name: str) -> Float64:
+    _check_range(table, indices, name)
     # Index 0 means absent and selects the row of zeros prepended here.
     looked_up: Float64 = np.concatenate([np.zeros((1, table.shape[1])), table])[indices]
     return looked_up

@@ -303,7 +303,7 @@ def _build_soup(
         return None
     if index.min() < 0 or index.max() >= len(positions):
         raise ValueError("a face with a vertex index out of range")
-    fans, polygon = split_polygons(faces.sizes, positions[index])
+    fans, polygon = split_polygons(faces.sizes, positions, index)
     corner = index[fans]
     uvs = _read_uvs(vertex, face, faces, fans, corner) if images else None
     textured = uvs is not None
