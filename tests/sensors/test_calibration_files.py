@@ -677,7 +677,7 @@ def rpy_matrix(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
 
 
 def test_a_camera_on_a_hand_is_where_the_links_of_its_robot_have_it(tmp_path: Path) -> None:
-    """The rig on a wrist has X out of the hand, the link Z: the camera is as the URDF has it."""
+    """The rig on a wrist has X out of the hand, the link Z: the camera has the URDF's place."""
     (tmp_path / "assets.yaml").write_text(
         "robots: [{id: arm, file: arm.urdf, gripper: {link: hand, finger_joints: [], "
         "grasp_offset_m: 0.1, stroke_m: 0.08}}]\n"
