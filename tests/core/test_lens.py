@@ -2,7 +2,6 @@
 
 import math
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +10,7 @@ from hypothesis import strategies as st
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.core.serialization import from_plain, to_plain
+from tests import opencv
 
 KITTI = Lens(
     "brown_conrady", (-0.3691481, 0.1968681, 1.353473e-3, 5.677587e-4, -0.06770705, 0.0, 0.0, 0.0)
@@ -30,16 +30,6 @@ def camera_of(
     return Intrinsics(width, height, focal_px, 1.02 * focal_px, 0.52 * width, 0.47 * height, lens)
 
 
-def by_opencv(camera: Intrinsics, points: np.ndarray) -> np.ndarray:
-    """Image coordinates; OpenCV's principal point is in the same coordinates as its points."""
-    function = cv2.fisheye if camera.lens.model == "kannala_brandt" else cv2
-    here, turn = np.zeros((1, 1, 3)), np.zeros(3)
-    found, _ = function.projectPoints(
-        points[:, None], turn, here[0, 0], camera.matrix(), np.array(camera.lens.coefficients)
-    )
-    return found[:, 0]
-
-
 def assert_is_opencvs(camera: Intrinsics) -> None:
     """Every pixel's ray goes where OpenCV says that it comes from."""
     rays = camera.pixel_rays()
@@ -47,7 +37,7 @@ def assert_is_opencvs(camera: Intrinsics) -> None:
     v, u = np.nonzero(shown)
     ahead = rays[shown][:, 2] > 0.02
 
-    there = by_opencv(camera, 7.0 * rays[shown][ahead])
+    there = opencv.places(camera, 7.0 * rays[shown][ahead])
 
     centres = np.stack([u + 0.5, v + 0.5], axis=-1)
     np.testing.assert_allclose(there, centres[ahead], atol=1e-6)

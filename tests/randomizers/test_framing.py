@@ -6,7 +6,6 @@ Expected images are projected by OpenCV, and by hand for panoramas.
 import math
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -20,6 +19,7 @@ from gen_data.core.scene import Body, Camera, ObjectGroup, Region, Scene, Suppor
 from gen_data.core.se3 import SE3, Array
 from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.randomizers.framing import Framing, Thing, frame, long_side_share
+from tests import opencv
 from tests.randomizers.doubles import FakeAssets, box_of, corners_of, rng_of
 
 LENSES = {
@@ -58,14 +58,11 @@ SCENE = Scene(
 
 def seen_px(points_camera_m: Array, k: Intrinsics) -> Array:
     """Image points, [n, 2], by OpenCV, whose pixel centres and ours differ by the same half."""
-    matrix, coefficients = k.matrix(), np.array(k.lens.coefficients or (0.0,) * 4)
     if k.lens.model == "equirectangular":
         x, y, z = points_camera_m.T
         angles = np.stack([np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))], axis=-1)
         return np.asarray(angles * (k.fx_px, k.fy_px) + (k.cx_px, k.cy_px))
-    module, none = cv2.fisheye if k.lens.model == "kannala_brandt" else cv2, np.zeros(3)
-    found, _ = module.projectPoints(points_camera_m[:, None], none, none, matrix, coefficients)
-    return np.asarray(found[:, 0])
+    return opencv.places(k, points_camera_m)
 
 
 def framed(scene: Scene = SCENE, number: int = 0, **given: object) -> Camera:
