@@ -1,4 +1,4 @@
-"""Images of points by OpenCV, whose pixel centres are where those of its camera matrix are."""
+"""Images of points by OpenCV; principal points and image points have the same coordinates."""
 
 from typing import Any
 
