@@ -12,7 +12,7 @@ from gen_data.core.scene import Body, Camera, Environment, IrradianceVolume, Lig
 from gen_data.core.se3 import SE3, Vec3, look_at
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
-from gen_data.rooms.interreflection import AXES, Hole, LitRoom, find_interreflection
+from gen_data.rooms.interreflection import Hole, LitRoom, find_interreflection
 from gen_data.rooms.lit_rooms import find_lit_rooms
 from tests.rooms.test_layouts import library, nominal
 
@@ -153,8 +153,3 @@ def test_an_empty_room_agrees_with_paths(kind: str) -> None:
         images.append(read.channels[Channel.RADIANCE].reshape(2, 18, 2, 24, 3).mean(axis=(1, 3, 4)))
 
     assert images[0] == pytest.approx(images[1], rel=0.12)
-
-
-def test_sides_are_numbered_by_their_outward_axes() -> None:
-    """+X, -X, +Y, -Y, +Z, -Z."""
-    assert AXES.tolist() == [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
