@@ -1,4 +1,4 @@
-"""Lens models against OpenCV, and what OpenCV leaves open: folds, fields, what lies behind."""
+"""Lens models against OpenCV, and where OpenCV leaves off: folds, fields, points behind."""
 
 import math
 
@@ -31,7 +31,7 @@ def camera_of(
 
 
 def assert_is_opencvs(camera: Intrinsics) -> None:
-    """Every pixel's ray goes where OpenCV says that it comes from."""
+    """Every pixel's ray goes where OpenCV has its origin."""
     rays = camera.pixel_rays()
     shown = np.isfinite(rays[..., 0])
     v, u = np.nonzero(shown)
@@ -60,7 +60,7 @@ def test_known_lenses_are_those_of_opencv(lens: Lens) -> None:
 def test_any_brown_conrady_lens_is_that_of_opencv(
     k1: float, k2: float, tangential: tuple[float, float], others: tuple[float, ...]
 ) -> None:
-    """The rational model with tangential terms; where it folds over, what is shown is right."""
+    """The rational model with tangential terms; where it folds over, visible pixels are right."""
     lens = Lens("brown_conrady", (k1, k2, *tangential, *others))
 
     assert_is_opencvs(camera_of(lens, (64, 48), 40.0))
@@ -124,7 +124,7 @@ def test_a_panorama_is_the_whole_sphere() -> None:
     ways = np.array([[0.0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 1], [0, -1, 0]])
     places = [[180.0, 90.0], [270.0, 90.0], [90.0, 90.0], [180.0, 135.0], [180.0, 0.0]]
     np.testing.assert_allclose(GLOBE.project(ways), places, atol=1e-5)
-    # Solid angles of the pixels sum to that of the sphere.
+    # Solid angles of the pixels sum to a whole sphere's.
     latitude = (np.arange(180) - 89.5) * math.pi / 180.0
     area = (2.0 * math.pi / 360.0) * (math.pi / 180.0) * np.cos(latitude).sum() * 360.0
     assert area == pytest.approx(4.0 * math.pi, rel=1e-4)

@@ -1,4 +1,4 @@
-"""Cameras of a user's own calibration show things where OpenCV projects them.
+"""Cameras of a user's own calibration show points where OpenCV projects them.
 
 The points come from the label images; they are projected by OpenCV alone, with the numbers in the
 file of Kalibr, and must be back at the centres of their pixels.

@@ -230,7 +230,7 @@ def test_thing_lies_as_far_from_the_middle_as_was_drawn(off_center: float, gap: 
 
 @pytest.mark.parametrize(("aim", "high_m"), [("table", 0.74), ("", 0.86)])
 def test_surface_and_scene_can_be_framed(aim: str, high_m: float) -> None:
-    """The middle of the table's top, and that of the scene's focus, in the middle of the image."""
+    """The middle of the table's top, and of the scene's focus, in the middle of the image."""
     camera = framed(aim=Constant(aim), off_center=Constant(0.0), fills=Constant(0.8))
     middle = camera.T_world_camera.inverse().apply(np.array([0.0, 0.0, high_m]))
 
