@@ -7,15 +7,10 @@ import numpy as np
 import pytest
 
 from gen_data import Dataset
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.content.procedural import fiducials
 
 CELL_PX = 8
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
 
 
 def scan(library: Library, asset_id: str, dots_per_m: float) -> Any:

@@ -271,7 +271,7 @@ def test_names_of_maps_survive_any_file_name_and_several_sizes_take_the_largest(
 
 
 def test_coverage_that_no_face_reaches_is_left_out(folder: Path) -> None:
-    """An atlas that is transparent beside the triangle's corner of it: the mesh stays solid."""
+    """An atlas that is transparent next to the triangle's corner of it: the mesh stays solid."""
     atlas = np.full((8, 8, 4), 200, np.uint8)
     atlas[..., 3] = np.where(np.arange(8) < 4, 255, 0)
     (folder / "wood.png").write_bytes(png(atlas))

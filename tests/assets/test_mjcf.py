@@ -11,12 +11,9 @@ from gen_data.assets.asset_folder import Folder
 from gen_data.assets.checking import check_folder
 from gen_data.assets.library import open_library
 from gen_data.assets.mjcf import read_mjcf
-from gen_data.assets.robot_description import RobotDescription
 from gen_data.core.errors import AssetError
-from gen_data.core.kinematics import joint_transform
-from gen_data.core.se3 import SE3
+from tests.assets.robot_files import TETRAHEDRON, poses_at
 
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 ARM = """<mujoco model="arm">
 <compiler angle="degree" meshdir="parts" texturedir="images"/>
 <default>
@@ -59,16 +56,6 @@ def write(folder: Path, text: str = ARM) -> Folder:
     return Folder(folder)
 
 
-def poses_of(described: RobotDescription, positions: dict[str, float]) -> dict[str, SE3]:
-    poses = {next(iter(described.links)): SE3()}
-    for joint in described.joints:
-        pose = poses[joint.parent] @ joint.T_parent_joint
-        if joint.movable:
-            pose = pose @ joint_transform(joint, positions[joint.name])
-        poses[joint.child] = pose
-    return poses
-
-
 @pytest.mark.parametrize("positions", [(0.0, 0.0, 0.0), (0.3, -0.05, 1.2), (-1.5, 0.3, -3.0)])
 def test_geoms_are_where_mujoco_has(tmp_path: Path, positions: tuple[float, float, float]) -> None:
     """At any joint positions, with anchors off the origin, a reference and two joints a body."""
@@ -79,7 +66,7 @@ def test_geoms_are_where_mujoco_has(tmp_path: Path, positions: tuple[float, floa
     for name, value in zip(names, positions, strict=True):
         data.joint(name).qpos = value
     mujoco.mj_forward(model, data)
-    poses = poses_of(described, dict(zip(names, positions, strict=True)))
+    poses = poses_at(described, **dict(zip(names, positions, strict=True)))
     (capsule,), (cylinder,) = (getattr(described.links["upper"], k)
                                for k in ("visuals", "collisions"))  # fmt: skip
     (ellipsoid,) = described.links["hand"].visuals
@@ -224,7 +211,7 @@ def test_primitives_are_fitted_to_their_meshes_as_mujoco_does(
             "ellipsoid": (a, b, c),
         }.get(kind, (a, 2 * b, 0.0))
         assert shape.size == pytest.approx(expected, abs=1e-6)
-        pose = poses_of(described, {})["b"] @ shape.T_link_shape
+        pose = poses_at(described)["b"] @ shape.T_link_shape
         matrix = data.geom_xmat[g].reshape(3, 3)
         np.testing.assert_allclose(pose.matrix()[:3, 3], data.geom_xpos[g], atol=1e-6)
         np.testing.assert_allclose(pose.rotation(), matrix, atol=1e-5)

@@ -15,9 +15,9 @@ from gen_data.assets.robot_formats import read_description
 from gen_data.assets.robot_shapes import read_shape
 from gen_data.core.errors import AssetError
 from gen_data.core.se3 import SE3
+from tests.assets.robot_files import TETRAHEDRON
 
 BOX = '<geometry><box size="0.1 0.2 0.3"/></geometry>'
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 
 
 def link(name: str, inside: str = "", collision: str = BOX) -> str:

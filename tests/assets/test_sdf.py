@@ -13,10 +13,9 @@ from gen_data.assets.robot_description import RobotDescription
 from gen_data.assets.robot_shapes import read_shape
 from gen_data.assets.sdf import read_sdf
 from gen_data.core.errors import AssetError
-from gen_data.core.kinematics import joint_transform
 from gen_data.core.se3 import SE3
+from tests.assets.robot_files import TETRAHEDRON, poses_at
 
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 BOX = "<geometry><box><size>0.2 0.4 0.6</size></box></geometry>"
 
 
@@ -31,17 +30,6 @@ def read(tmp_path: Path, *parts: str) -> RobotDescription:
     text = "\n".join(['<sdf version="1.9"><model name="m">', *parts, "</model></sdf>"])
     (tmp_path / "a.sdf").write_text(text)
     return read_sdf(Folder(tmp_path), "a.sdf")
-
-
-def poses_at(described: RobotDescription, **positions: float) -> dict[str, SE3]:
-    """``T_root_link`` at joint positions."""
-    poses = {next(iter(described.links)): SE3()}
-    for joint in described.joints:
-        pose = poses[joint.parent] @ joint.T_parent_joint
-        poses[joint.child] = (
-            pose @ joint_transform(joint, positions.get(joint.name, 0.0)) if joint.movable else pose
-        )
-    return poses
 
 
 def middle(described: RobotDescription, link_name: str, **positions: float) -> list[float]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gen_data.assets.library import Library
-from gen_data.core.asset_types import RobotModel
+from gen_data.core.kinematics import link_poses
 from gen_data.core.se3 import SE3
 
 ROBOTS = ("franka_panda", "kuka_iiwa", "xarm6")
@@ -14,26 +14,10 @@ TOOLED = ("franka_panda_suction", "kuka_iiwa_gripper", "kuka_iiwa_suction", "xar
 """The same arms with tools made by code."""
 
 
-def link_poses(robot: RobotModel, positions: tuple[float, ...]) -> dict[str, SE3]:
-    poses, remaining = {robot.links[0]: SE3()}, list(positions)
-    for joint in robot.joints:
-        motion = SE3()
-        if joint.movable:
-            q = remaining.pop(0)
-            x, y, z = joint.axis
-            if joint.kind == "prismatic":
-                motion = SE3((q * x, q * y, q * z))
-            else:
-                s = math.sin(q / 2)
-                motion = SE3((0.0, 0.0, 0.0), (math.cos(q / 2), s * x, s * y, s * z))
-        poses[joint.child] = poses[joint.parent] @ joint.T_parent_joint @ motion
-    return poses
-
-
 def test_the_panda_has_the_joints_reach_and_colour_of_its_maker(library: Library) -> None:
     """At zero the flange is at (0.088, 0, 0.926) m and looks down (Franka, DH table)."""
     robot = library.robot("franka_panda")
-    flange = link_poses(robot, (0.0,) * 9)["panda_link8"]
+    flange = link_poses(robot, SE3(), (0.0,) * 9)["panda_link8"]
     assert flange.translation_m == pytest.approx((0.088, 0.0, 0.926), abs=1e-6)
     assert flange.rotate(np.array([0.0, 0.0, 1.0])) == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
     # Order of the movable joints: arm from base to hand, then fingers.
@@ -66,7 +50,7 @@ def test_tools_point_out_of_the_flange_and_close_at_the_grasp(library: Library, 
         0.0 if joint.name in gripper.finger_joints else q
         for joint, q in zip(robot.movable, robot.home, strict=True)
     )
-    poses = link_poses(robot, closed)
+    poses = link_poses(robot, SE3(), closed)
     T_grasp_world = (poses[gripper.link] @ gripper.T_link_grasp).inverse()
     tips = [link for link in robot.links if link.endswith("finger")] or [gripper.link]
     parts = [
@@ -88,7 +72,7 @@ def test_tools_point_out_of_the_flange_and_close_at_the_grasp(library: Library, 
 def test_the_grasp_frame_lies_between_the_finger_tips(library: Library) -> None:
     """Fully open, the tips are 0.08 m apart along the grasp frame's Y, at its height."""
     robot = library.robot("franka_panda")
-    poses = link_poses(robot, robot.home)
+    poses = link_poses(robot, SE3(), robot.home)
     assert robot.gripper is not None
     T_grasp_world = (poses["panda_hand"] @ robot.gripper.T_link_grasp).inverse()
     tips = {}

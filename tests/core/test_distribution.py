@@ -14,7 +14,7 @@ from gen_data.core.errors import SampleError
 from tests.repository import ROOT, repository_files
 
 HISTORY = {"CHANGELOG.md", "tests/core/test_distribution.py"}
-"""The page of past changes, and this list of what must not be."""
+"""The page of past changes, and this list of forbidden text."""
 AS_REQUIREMENT = re.compile(
     r"""gen-data\\*\[                            # with extras
     | ^name\ =\ "gen-data"
@@ -63,7 +63,7 @@ def test_nothing_asks_an_index_for_the_project_that_took_the_short_name() -> Non
     'dependencies = ["numpy", "gen-data"]', 'version("gen-data")',
 ])  # fmt: skip
 def test_the_search_finds_requirements(text: str) -> None:
-    """What it must not find stands for itself: the command, and folders of the user."""
+    """Forbidden text stands for itself: the command, and folders of the user."""
     assert AS_REQUIREMENT.search(text)
     assert not AS_REQUIREMENT.search(text.replace("gen-data", DISTRIBUTION))
 

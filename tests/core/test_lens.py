@@ -1,8 +1,7 @@
-"""Lens models against OpenCV, and what OpenCV leaves open: folds, fields, what lies behind."""
+"""Lens models against OpenCV, and where OpenCV leaves off: folds, fields, points behind."""
 
 import math
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +10,7 @@ from hypothesis import strategies as st
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.core.serialization import from_plain, to_plain
+from tests import opencv
 
 KITTI = Lens(
     "brown_conrady", (-0.3691481, 0.1968681, 1.353473e-3, 5.677587e-4, -0.06770705, 0.0, 0.0, 0.0)
@@ -30,24 +30,14 @@ def camera_of(
     return Intrinsics(width, height, focal_px, 1.02 * focal_px, 0.52 * width, 0.47 * height, lens)
 
 
-def by_opencv(camera: Intrinsics, points: np.ndarray) -> np.ndarray:
-    """Image coordinates; OpenCV's principal point is in the same coordinates as its points."""
-    function = cv2.fisheye if camera.lens.model == "kannala_brandt" else cv2
-    here, turn = np.zeros((1, 1, 3)), np.zeros(3)
-    found, _ = function.projectPoints(
-        points[:, None], turn, here[0, 0], camera.matrix(), np.array(camera.lens.coefficients)
-    )
-    return found[:, 0]
-
-
 def assert_is_opencvs(camera: Intrinsics) -> None:
-    """Every pixel's ray goes where OpenCV says that it comes from."""
+    """Every pixel's ray goes where OpenCV has its origin."""
     rays = camera.pixel_rays()
     shown = np.isfinite(rays[..., 0])
     v, u = np.nonzero(shown)
     ahead = rays[shown][:, 2] > 0.02
 
-    there = by_opencv(camera, 7.0 * rays[shown][ahead])
+    there = opencv.places(camera, 7.0 * rays[shown][ahead])
 
     centres = np.stack([u + 0.5, v + 0.5], axis=-1)
     np.testing.assert_allclose(there, centres[ahead], atol=1e-6)
@@ -70,7 +60,7 @@ def test_known_lenses_are_those_of_opencv(lens: Lens) -> None:
 def test_any_brown_conrady_lens_is_that_of_opencv(
     k1: float, k2: float, tangential: tuple[float, float], others: tuple[float, ...]
 ) -> None:
-    """The rational model with tangential terms; where it folds over, what is shown is right."""
+    """The rational model with tangential terms; where it folds over, visible pixels are right."""
     lens = Lens("brown_conrady", (k1, k2, *tangential, *others))
 
     assert_is_opencvs(camera_of(lens, (64, 48), 40.0))
@@ -134,7 +124,7 @@ def test_a_panorama_is_the_whole_sphere() -> None:
     ways = np.array([[0.0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 1], [0, -1, 0]])
     places = [[180.0, 90.0], [270.0, 90.0], [90.0, 90.0], [180.0, 135.0], [180.0, 0.0]]
     np.testing.assert_allclose(GLOBE.project(ways), places, atol=1e-5)
-    # Solid angles of the pixels sum to that of the sphere.
+    # Solid angles of the pixels sum to a whole sphere's.
     latitude = (np.arange(180) - 89.5) * math.pi / 180.0
     area = (2.0 * math.pi / 360.0) * (math.pi / 180.0) * np.cos(latitude).sum() * 360.0
     assert area == pytest.approx(4.0 * math.pi, rel=1e-4)

@@ -124,7 +124,7 @@ def test_a_file_is_unmapped_with_its_last_view(tmp_path: Path) -> None:
 
 
 def test_only_views_of_files_are_not_owned(tmp_path: Path) -> None:
-    """Copies and arrays over bytes take memory of their own."""
+    """Copies and arrays over bytes take their own memory."""
     write(tmp_path / "file")
     view = np.frombuffer(mapped(tmp_path / "file"), np.uint8)
     in_bytes = np.frombuffer(bytes(100), np.uint8)

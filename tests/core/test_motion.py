@@ -1,4 +1,4 @@
-"""Tracks pass through their knots, move as calculus says, and carry everything that rides along."""
+"""Tracks pass through their knots, move as calculus demands, and carry all that rides along."""
 
 import math
 from dataclasses import replace

@@ -99,7 +99,7 @@ def test_rectangles_that_share_an_edge_do_not_overlap() -> None:
 
 
 def test_one_rectangle_is_compared_with_many() -> None:
-    """Shapes broadcast: near, far, and turned so that only its corner reaches."""
+    """Shapes broadcast: near, far, and turned so that only one corner reaches."""
     own, half = np.array([0.0, 0.0, 1.0, 0.0]), np.array([1.0, 1.0])
     slope = math.sqrt(0.5)
     others = np.array([[1.5, 0.0, 1.0, 0.0], [4.0, 0.0, 1.0, 0.0], [2.3, 0.0, slope, slope]])

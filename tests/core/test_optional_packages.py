@@ -45,7 +45,7 @@ def test_what_is_installed_is_not_missing() -> None:
 def test_features_without_their_package_name_the_extra_before_they_begin(
     bare: None, tmp_path: Path
 ) -> None:
-    """Exporters by ``check``, readers by the file, and the preview with what works without."""
+    """Exporters by ``check``, readers by the file, and the preview with the rest."""
     assert missing_packages("pxr", "h5py", "mcap") == (
         "needs the packages h5py, mcap, usd-core: " + distribution.install_command("formats", "usd")
     )

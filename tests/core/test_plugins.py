@@ -45,7 +45,7 @@ class Lacking(BaseModel):
 
 
 class Misnamed(Complete):
-    """Its field says another name than the table."""
+    """Its field has another name than the table."""
 
 
 class Plain:

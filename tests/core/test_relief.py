@@ -50,7 +50,7 @@ def test_land_rises_on_one_side_and_falls_on_the_other() -> None:
 
 @pytest.mark.parametrize("curvature", [0.005, -0.005, 0.0])
 def test_profile_follows_the_bend_of_its_road(curvature: float) -> None:
-    """On the points of an arc, found by summing small steps, the height is that of the profile."""
+    """On the points of an arc, found by summing small steps, the height is the profile's."""
     steps = 40_000
     ds = 200.0 / steps
     heading = 0.7 + curvature * ds * (np.arange(steps) + 0.5)
@@ -72,9 +72,9 @@ S_CURVE = (10.0, 30.0, 30.0, 0.005, 0.05, 100.0, 30.0, 30.0, -0.005, 0.04)
 
 @pytest.mark.parametrize("left_m", [0.0, 6.0, -6.0])
 def test_roads_follow_clothoids_and_slope_down_to_the_inside_of_arcs(left_m: float) -> None:
-    """Beside a line found by summing small steps: grade times arc length, and bank times distance.
+    """Next to a line found by summing small steps: grade times arc length, and bank times distance.
 
-    Cells of 4 m bend the ground where clothoids begin: 6 m beside it, the grade changes by 1 %.
+    Cells of 4 m bend the ground where clothoids begin: 6 m next to it, the grade changes by 1 %.
     """
     steps = 40_000
     ds = 200.0 / steps

@@ -34,7 +34,7 @@ class Strict:
     b'<?xml version="1.0"?>', b'<?xml version="1.1" encoding="utf-8"?>', b"",
 ])  # fmt: skip
 def test_any_version_is_read_as_version_1(start: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those of pybullet declare version 0.0, which newer parsers refuse; lines and columns stay."""
+    """Files of pybullet declare version 0.0, which newer parsers refuse; lines and columns stay."""
     monkeypatch.setattr(expat, "ParserCreate", Strict)
     text = start + b'\n<robot name="a">\n  <link/></robot>'
 

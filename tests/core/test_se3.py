@@ -1,4 +1,4 @@
-"""Rigid poses: group laws, agreement with matrices, and cameras that look at things."""
+"""Rigid poses: group laws, agreement with matrices, and cameras that look at places."""
 
 import math
 
@@ -110,7 +110,7 @@ def test_about_z_turns_x_to_y() -> None:
 
 
 def test_rounding_lands_on_the_decimal_grid() -> None:
-    """Also negative zero becomes zero, so that text is the same; the quaternion stays unit."""
+    """Negative zero becomes zero, too, so that text is the same; the quaternion stays unit."""
     pose = SE3((1.23456789, -0.00000001, 2.0), (0.5, 0.5, 0.5, 0.5)).rounded()
 
     assert pose.translation_m == (1.234568, 0.0, 2.0)
@@ -155,7 +155,7 @@ def test_look_at_keeps_the_horizon_level(
 
 
 def test_a_positive_roll_turns_the_camera_clockwise() -> None:
-    """Seen along the viewing direction: X moves towards what was down."""
+    """Seen along the viewing direction: X moves towards the former down."""
     level, rolled = look_at((0, 0, 0), (1, 0, 0)), look_at((0, 0, 0), (1, 0, 0), math.pi / 2)
 
     np.testing.assert_allclose(level.rotation()[:, 0], [0, -1, 0], atol=1e-12)

@@ -65,7 +65,7 @@ def test_a_value_survives_json(value: Outer) -> None:
 
 
 def test_a_scene_survives_json() -> None:
-    """The noun that is written beside every sample."""
+    """The noun in the sidecar of every sample."""
     scene = Scene(
         template="tabletop",
         bodies=(Body("table", "table?seed=1", SE3.about_z(0.3, (1, 2, 3)), mass_kg=2.5),),

@@ -1,4 +1,4 @@
-"""Disparities of rectified pairs, and what only one camera of them sees."""
+"""Disparities of rectified pairs, and points that only one of their cameras sees."""
 
 import math
 
@@ -88,7 +88,7 @@ def test_what_the_other_camera_sees_agrees_with_lines_of_sight(sign: float) -> N
 
 
 def test_a_projector_may_reach_beyond_the_image_and_nothing_is_seen_by_nobody() -> None:
-    """Points beside its image are seen if one says so; column 4 has one half a pixel outside."""
+    """Points next to its image are seen if asked for; column 4 has one half a pixel outside."""
     flat = np.full((2, 20), 5.0, np.float32)
 
     assert is_seen_by_both(flat, flat)[0].tolist() == [False] * 5 + [True] * 15

@@ -17,7 +17,7 @@ def first(streams: Streams, name: str = "lighting/sun") -> float:
 
 
 def test_drawing_elsewhere_moves_nothing() -> None:
-    """A randomizer can be inserted, removed or moved without changing what others draw."""
+    """A randomizer can be inserted, removed or moved without changing the draws of others."""
     alone = BASE.rng("lighting/sun").random(3)
 
     BASE.rng("materials/finish").random(1000)

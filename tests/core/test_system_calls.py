@@ -1,4 +1,4 @@
-"""Systems with fewer calls than Linux, imitated in processes of their own.
+"""Systems with fewer calls than Linux, imitated in separate processes.
 
 Neither macOS nor Windows runs here: what is tested is that everything works without the calls that
 they lack. Their own calls are replaced by ones that do the same.
@@ -168,7 +168,7 @@ def test_a_helper_ends_with_its_parent_where_no_kernel_ends_it(tmp_path: Path) -
 
 
 def test_a_file_without_a_path_needs_no_memory_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It holds what was written, for whoever has its descriptor."""
+    """It holds the written bytes, for whoever has its descriptor."""
     monkeypatch.delattr(os, "memfd_create")
     descriptor = anonymous_file("job")
     os.write(descriptor, b"content")

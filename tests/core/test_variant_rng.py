@@ -1,4 +1,4 @@
-"""Draws of variants: the same stream, whatever an asset id asks for."""
+"""Draws of variants: the same stream for every asset id."""
 
 import re
 
@@ -8,7 +8,7 @@ from gen_data.core.variant_rng import Draw, DrawnValue, VariantRng, drawing, var
 
 
 def draw_desk(seed: int) -> dict[str, object]:
-    """A family in small: a range, a whole number, an option, a chance, and what follows them."""
+    """A family in small: a range, a whole number, an option, a chance, and their consequences."""
     rng = variant_rng("desk", seed)
     return {
         "width_m": rng.between(1.2, 1.8, "width_m"),

@@ -56,7 +56,7 @@ def page(live: Live) -> Page:
 
 
 def make_cache(folder: Path) -> Path:
-    """The cache of the user with an empty gallery of its own."""
+    """The cache of the user with its own empty gallery."""
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     (user / "gen-data").mkdir(parents=True, exist_ok=True)
     (folder / "gen-data/gallery").mkdir(parents=True)

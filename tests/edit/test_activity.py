@@ -1,4 +1,4 @@
-"""What the page says while the first picture is prepared."""
+"""Words of the page while the first picture is prepared."""
 
 from __future__ import annotations
 

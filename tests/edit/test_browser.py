@@ -212,7 +212,7 @@ def test_kinds_of_labels_without_any_are_told(page: Page) -> None:
 
 
 def test_a_file_that_another_program_changes_or_deletes_is_told(live: Live, page: Page) -> None:
-    """Within a few seconds; saving asks, and writes the text that the page has."""
+    """Within a few seconds; saving asks, and writes the page's text."""
     (live.folder / "mine.yaml").write_text("seed: 3\n")
     page.wait_for_selector("[role=status]:text-is('not saved: the file has changed on disk')")
     (live.folder / "mine.yaml").unlink()

@@ -1,4 +1,4 @@
-"""Files in the page: own meshes and photographs, the gallery, data sets, and what is refused."""
+"""Files in the page: own meshes and photographs, the gallery, data sets, and refusals."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def test_a_photograph_begins_a_scene_and_a_mesh_joins_it(live: Live) -> None:
 
 
 def fit(page: Page) -> None:
-    """With few scenes, until it tells which file it has written."""
+    """With few scenes, until it names the written file."""
     page.click(".q-tab:has-text('Statistics')")
     page.fill("[data-fit=scenes]", "4")
     page.click("button:has-text('Fit to the real pictures')")
@@ -192,7 +192,7 @@ def test_a_scene_of_meshes_has_no_place_for_a_photograph_behind_it(live: Live, p
 
 
 def test_the_start_page_shows_every_shipped_configuration(live: Live) -> None:
-    """As a picture each: those of earlier servers at once, the missing one when it is rendered."""
+    """As a picture each: from earlier servers at once, the missing one when it is rendered."""
     jpeg = cv2.imencode(".jpg", np.zeros((30, 40, 3), np.uint8))[1].tobytes()
     shipped = shipped_configurations()
     for name, text in shipped.items():

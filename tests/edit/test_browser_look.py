@@ -39,7 +39,7 @@ CONTRAST = """() => {
   }
   return found;
 }"""
-"""Contrast of every visible text to what is behind it (WCAG 2.2, relative luminance)."""
+"""Contrast of every visible text to its background (WCAG 2.2, relative luminance)."""
 PLACES = """() => {
   const element = document.activeElement, style = getComputedStyle(element);
   const name = element.ariaLabel || element.dataset.layer || element.innerText?.trim()

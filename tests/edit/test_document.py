@@ -1,4 +1,4 @@
-"""What the editor shows of a text: faults, origins, completions, explanations, controls."""
+"""The editor's view of a text: faults, origins, completions, explanations, controls."""
 
 from __future__ import annotations
 

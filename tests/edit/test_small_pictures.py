@@ -56,7 +56,7 @@ def test_scenes_stay_when_only_a_camera_develops_differently(
 ) -> None:
     """No randomizer draws again for an exposure or a limit of labels, in any of two streets.
 
-    Pictures are those of a new process, and one physics engine serves all texts of its settings.
+    Pictures equal a new process's, and one physics engine serves all texts of its settings.
     """
     drawn: list[str] = []
     opened: list[Engine] = []
@@ -117,7 +117,7 @@ def test_a_small_picture_shows_the_sample_of_the_run() -> None:
             and abs(item.height_px - height) <= limit_px
             for category, width, height in expected
         )
-    # Draws are those of this sample, whatever was drawn before.
+    # Draws belong to this sample, whatever was drawn before.
     again = Studio().show(Order(TEXT, "x.yaml", 1, View()))
     other = studio.show(Order(TEXT, "x.yaml", 2, View()))
     assert studio.show(Order(TEXT, "x.yaml", 1, View("depth"))).draws == shown.draws

@@ -132,7 +132,7 @@ def test_an_item_goes_behind_the_last_one() -> None:
 def test_lines_that_were_not_edited_keep_their_ends(
     original: str, edited: str, expected: str
 ) -> None:
-    """An editor knows LF only."""
+    """An editor has LF only."""
     assert restore_lines(original, edited) == expected
     assert restore_lines(original, OpenedFile(Path(), original).text) == original
 
@@ -151,7 +151,7 @@ def test_a_file_that_changed_meanwhile_is_not_overwritten(tmp_path: Path) -> Non
 
 
 def test_a_text_cannot_name_files_outside_of_the_folders(tmp_path: Path) -> None:
-    """But for those that the user's file named when it was opened; links are followed."""
+    """Except for files that the user's file named when it was opened; links are followed."""
     inside, outside = tmp_path / "in", tmp_path / "out"
     inside.mkdir()
     outside.mkdir()

@@ -36,7 +36,7 @@ def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts
      ("[9, 2]", "low <= high")),
 ])  # fmt: skip
 def test_misuse_exits_2(tmp_path: Path, arguments: tuple[str, ...], texts: tuple[str, ...]) -> None:
-    """Usage and configuration errors name the argument or field, and what was expected."""
+    """Usage and configuration errors name the argument or field, and the expected value."""
     assert_refused(tmp_path, arguments, 2, *texts)
 
 
@@ -92,7 +92,7 @@ TETRAHEDRON = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 2 3\nf 1 2 4\nf 1 3 4\
 def test_corrupt_files_of_assets_exit_with_3(
     tmp_path: Path, files: dict[str, bytes], texts: tuple[str, ...]
 ) -> None:
-    """A picture, a mesh, a stage: the file is named, with what to do about it."""
+    """A picture, a mesh, a stage: the file is named, with a remedy."""
     (tmp_path / "mine").mkdir()
     for name, content in files.items():
         (tmp_path / "mine" / name).write_bytes(content)

@@ -236,7 +236,7 @@ def test_damaged_files_are_named(
 
 @pytest.mark.slow
 def test_sensors_at_other_instants_export_the_same_bytes(tmp_path: Path) -> None:
-    """Boxes of a delayed scanner are those of its own instant, also in a later export."""
+    """Boxes of a delayed scanner are at its own instant, in a later export, too."""
     made = gen_data(
         "--config", "tabletop_sequence.yaml", "--n", "2", "--workers", "1", "--out", "made",
         "--set", "steps_per_scene=2", "--set", "splits={train: 1, val: 0, test: 0}",

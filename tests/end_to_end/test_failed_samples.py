@@ -51,7 +51,7 @@ def test_the_plan_is_that_of_a_run_without_the_options(folder: Path) -> None:
 
 
 def test_the_data_set_and_its_loader_have_the_other_samples_and_all_are_valid(folder: Path) -> None:
-    """Their numbers are those of the plan; each comes once per epoch."""
+    """Their numbers are the plan's; each comes once per epoch."""
     data = gen_data.open(folder)
 
     assert len(data) == 3

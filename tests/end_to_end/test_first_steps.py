@@ -24,7 +24,7 @@ SHIPPED = ("tabletop", "street", "pedestrians", "bin_picking", "kitti_rig", "she
 
 @pytest.mark.parametrize("name", sampled(SHIPPED, 6))
 def test_init_writes_a_configuration_and_its_template(name: str, tmp_path: Path) -> None:
-    """They read as the shipped ones, beside each other in an empty folder."""
+    """They read as the shipped ones, next to each other in an empty folder."""
     done = gen_data("init", "--template", name, cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr

@@ -126,7 +126,7 @@ def test_a_class_that_could_occur_and_did_not_is_named(tmp_path: Path) -> None:
 
 
 def test_plan_measures_labels_by_class(tmp_path: Path) -> None:
-    """With --probe: labels per sample of each class; without it, what each class consists of."""
+    """With --probe: labels per sample of each class; without it, the parts of each class."""
     config = room(SEES, labels={"map": {"classes": {"fruit": ["apple", "orange"]}}})
     (tmp_path / "c.yaml").write_text(yaml.safe_dump(config))
     done = run("plan", "c.yaml", "--n", "10", "--probe", "2", cwd=tmp_path)

@@ -1,4 +1,4 @@
-"""Mistakes of the first day: each message says what to type instead."""
+"""Mistakes of the first day: each message has the text to type instead."""
 
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ def test_what_is_no_command_is_told_what_was_probably_meant(
     ("repair", "nosuch"),
 ])  # fmt: skip
 def test_a_missing_folder_is_called_so(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    """With the nearest name beside it."""
+    """With the nearest name next to it."""
     (tmp_path / "nosuchh").mkdir()
     done = run(*arguments, cwd=tmp_path)
     assert done.returncode != 0
@@ -46,7 +46,7 @@ def test_a_missing_folder_is_called_so(arguments: tuple[str, ...], tmp_path: Pat
 
 
 def test_configurations_are_suggested_only_if_similar(tmp_path: Path) -> None:
-    """The ending .yaml is no similarity; thirty names are no help."""
+    """The ending .yaml does not count as similar; thirty names do not help."""
     done = run("plan", "nosuch.yaml", "--n", "3", cwd=tmp_path)
     assert "there is no configuration 'nosuch.yaml'" in done.stderr
     assert "did you mean" not in done.stderr

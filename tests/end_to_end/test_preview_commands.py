@@ -60,7 +60,7 @@ def test_shipped_schema_is_the_generated_one(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_doctor_finds_this_machine_fit(tmp_path: Path) -> None:
-    """Every check of a machine that runs the tests passes, and one tells how fast it is."""
+    """Every check of a machine that runs the tests passes, and one measures its speed."""
     done = gen_data("doctor", cwd=tmp_path)
 
     assert done.returncode == 0, done.stdout + done.stderr

@@ -349,7 +349,7 @@ def test_folders_outside_of_the_recipes_own_are_not_read(reader: Path, kind: str
 
 
 def test_trust_reads_such_a_folder(reader: Path) -> None:
-    """The mesh of another name is found, and is not that of the recipe."""
+    """The mesh of another name is found, and differs from the recipe's."""
     outside = reader.parent / f"{reader.name}-trusted"
     outside.mkdir()
     (outside / "secret.obj").write_text(BLOCK)

@@ -1,4 +1,4 @@
-"""Scenes of a finished data set, rendered again: pairs that differ in one thing only."""
+"""Scenes of a finished data set, rendered again: pairs with a single difference."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from tests.end_to_end.running import digest, gen_data
 
 
 def test_without_a_change_every_sample_has_the_same_bytes(dataset: Path, tmp_path: Path) -> None:
-    """Images, labels and scenes; only the plan tells the two data sets apart."""
+    """Images, labels and scenes; only the plan differs between the two data sets."""
     done = gen_data("rerender", str(dataset), "--out", "again", "--workers", "1", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
@@ -118,7 +118,7 @@ def test_a_single_sample_has_its_bytes_in_the_data_set(dataset: Path, tmp_path: 
 
 @pytest.mark.slow
 def test_attributes_state_what_the_new_scenes_show(tmp_path: Path) -> None:
-    """A changed shared value is the new one; one that no longer holds is no attribute."""
+    """A changed shared value is the new one; one that no longer holds is left out."""
     config = tmp_path / "lit.yaml"
     config.write_text(
         "extends: tabletop.yaml\nshared: {lux: {choice: [300, 400]}}\n"

@@ -27,7 +27,7 @@ ROWS = [[f"name_{k}", *[f"{k}.{c:02d}" for c in range(9)]] for k in range(3)]
 
 @pytest.mark.parametrize("columns", [80, 120, 200])
 def test_no_word_of_a_wide_table_is_cut(columns: int) -> None:
-    """Its columns continue below, beside the first one again."""
+    """Its columns continue below, next to the first one again."""
     text = printed({"header": HEADER, "rows": ROWS}, columns)
     assert max(map(len, text.splitlines())) <= columns
     assert "…" not in text
@@ -41,7 +41,7 @@ def test_no_word_of_a_wide_table_is_cut(columns: int) -> None:
 
 
 def test_long_remarks_are_wrapped_between_words() -> None:
-    """In a column of their own, wide enough to be read."""
+    """In a separate column, wide enough to be read."""
     remark = "narrower with more --scenes; the interval of a recording of 20 pictures is this only"
     header = ["quantity", "value", "from", "to", "unit", "remark"]
     rows = [["exposure compensation", "1.375", "0.58", "1.02", "EV", remark]]

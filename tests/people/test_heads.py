@@ -28,7 +28,7 @@ def built(haircut: str, pose: str = "stand") -> MeshData:
 
 
 def faces_of(mesh: MeshData, role: str) -> np.ndarray:
-    """Triangles whose material has a role, as vertices [n, 3, 3]; brows are no hair."""
+    """Triangles whose material has a role, as vertices [n, 3, 3]; brows do not count as hair."""
     slots = [
         k
         for k, material in enumerate(mesh.materials)

@@ -61,7 +61,7 @@ def write_source(folder: Path) -> None:
 
 
 def write_targets(folder: Path, count: int) -> None:
-    """Empty shapes; those of height raise every point."""
+    """Empty shapes; shapes of height raise every point."""
     extents = ("min", "average", "max")
     for sex in ("female", "male"):
         for age in ("child", "young", "old"):

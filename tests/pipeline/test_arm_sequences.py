@@ -36,7 +36,7 @@ def test_a_sample_alone_equals_the_one_in_its_sequence(sequence: list[Sample]) -
 def test_the_robots_box_follows_its_arm_and_what_is_carried_follows_the_hand(
     sequence: list[Sample],
 ) -> None:
-    """The robot's box changes while its base stands; one thing ends elsewhere, all others stay."""
+    """The robot's box changes while its base stands; one object ends elsewhere, all others stay."""
     boxes = {s.scene.instance(_robot(s)).box_max_m for s in sequence}
     bases = {s.scene.instance(_robot(s)).T_world_instance for s in sequence}
     first, last = sequence[0].scene, sequence[-1].scene

@@ -135,7 +135,7 @@ def test_exporters_have_readings_that_arrive_and_refuse_doubled_ones(view: str) 
 
 
 def test_wrong_clocks_reach_the_rows_and_nothing_else() -> None:
-    """0.1 s and 1 % too late; noise and faults have streams of their own."""
+    """0.1 s and 1 % too late; noise and faults have their own streams."""
     late = with_faults(clock={"offset_s": 0.1, "drift_ppm": 10_000})
     with pipeline() as made, pipeline(sensors=late) as wrong:
         for k in range(STEPS):
@@ -158,7 +158,7 @@ def test_views_have_sequences_of_their_own() -> None:
 
 
 def test_streams_of_a_sequence_are_the_same_at_every_step() -> None:
-    """And none of those that steps draw from."""
+    """And none of the streams of steps."""
     steps = [Streams(1, 2, view=0, step=k).rng("sensor/imu") for k in range(3)]
     shared = [rng.of_sequence().random() for rng in steps]
 

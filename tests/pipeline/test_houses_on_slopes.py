@@ -65,7 +65,7 @@ def test_stairs_lead_from_doors_to_the_ground(slope: tuple[Street, AssetLibrary]
         assert drops.min() > -1e-4
         assert drops.max() < 0.1801
         ground = street.ground_m(places)
-        # The lowest step may lie in the ground; what is left to step down is no more than a riser.
+        # The lowest step may lie in the ground; the remaining step down is at most a riser.
         assert tops[-1] - ground[-1] < 0.18
         assert tops[0] - ground[0] > 0.04
 

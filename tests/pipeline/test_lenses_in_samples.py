@@ -2,13 +2,12 @@
 
 from collections.abc import Iterator
 
-import cv2
-import numpy as np
 import pytest
 
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.sample import Sample
+from tests import opencv
 
 SMALL = (
     "sensors.color.size_px=[200, 160]",
@@ -47,14 +46,8 @@ def test_objects_are_where_opencv_projects_their_boxes(samples: list[Sample]) ->
             if corners[:, 2].min() < 0.05:
                 continue
             # Edges bow outwards by less than two pixels at this size.
-            places, _ = cv2.fisheye.projectPoints(
-                corners[:, None],
-                np.zeros(3),
-                np.zeros(3),
-                k.matrix(),
-                np.array(k.lens.coefficients),
-            )
-            low, high = places[:, 0].min(axis=0) - 2.0, places[:, 0].max(axis=0) + 2.0
+            places = opencv.places(k, corners)
+            low, high = places.min(axis=0) - 2.0, places.max(axis=0) + 2.0
             assert low[0] <= item.box.x_min and item.box.x_max <= high[0]
             assert low[1] <= item.box.y_min and item.box.y_max <= high[1]
             looked_at += 1

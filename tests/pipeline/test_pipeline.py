@@ -29,7 +29,7 @@ CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(8, 6, 1.0))
 
 @dataclass(frozen=True)
 class Draws:
-    """A randomizer that writes what it drew into the environment's yaw."""
+    """A randomizer that writes its draw into the environment's yaw."""
 
     name: str
     stage: Stage
@@ -161,7 +161,7 @@ def test_one_settled_scene_serves_all_its_views() -> None:
 
 
 def test_scene_that_is_never_valid_is_rejected_with_the_tally() -> None:
-    """Five attempts, each with other draws; the error counts the reasons and says what to try."""
+    """Five attempts, each with other draws; the error counts the reasons and names a remedy."""
     with pipeline(BUILD, physics=RefusingPhysics()) as made, pytest.raises(SceneRejected) as error:
         made.sample(3)
 
@@ -275,7 +275,7 @@ class WithMirrors(TwoBoxes):
 def test_boxes_leave_out_mirrors_unless_all_is_labelled(
     extent: Literal["body", "all"], width_m: float
 ) -> None:
-    """A body of twice its size; what other code measures it by stays whole."""
+    """A body of twice its size; its measures for other code stay whole."""
     scene = Scene(
         "test",
         bodies=(Body("car", "box", SE3((1.0, 0.0, 0.5)), scale=2.0, instance_id=1),),

@@ -36,7 +36,7 @@ def test_a_hand_becomes_as_many_instances_as_bananas() -> None:
 
 
 def test_pieces_are_where_the_hand_was() -> None:
-    """All vertices of the pieces together are those of the hand, within the vertex grid."""
+    """All vertices of the pieces together are the hand's, within the vertex grid."""
     made = separate_pieces(fruit(HAND))
     whole = FAMILIES["banana"].build(seed=4).mesh.vertices_m.astype(np.float64)
     parts = [

@@ -47,7 +47,7 @@ def reading(sample: Sample) -> SensorReading:
 
 @pytest.mark.slow
 def test_every_label_of_a_rolling_image_agrees_with_it(sample: Sample) -> None:
-    """Boxes and masks are those of the id image, and every share is one."""
+    """Boxes and masks fit the id image, and every share is one."""
     truth, ids = sample.truth["dash"], reading(sample).channels[Channel.INSTANCE]
 
     assert truth.objects
@@ -59,7 +59,7 @@ def test_every_label_of_a_rolling_image_agrees_with_it(sample: Sample) -> None:
 
 @pytest.mark.slow
 def test_the_camera_of_the_truth_tells_when_its_rows_were_exposed(sample: Sample) -> None:
-    """The same shutter in the scene, in the reading and in what annotators saw."""
+    """The same shutter in the scene, in the reading and before annotators."""
     shutter = sample.scene.camera("dash").shutter
 
     assert (shutter.exposure_s, shutter.readout_s) == (0.008, 0.025)
@@ -90,7 +90,7 @@ def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample
 
 @pytest.mark.slow
 def test_flow_of_the_street_is_that_of_the_next_image(sample: Sample, following: Sample) -> None:
-    """Where the point is not hidden, the next image shows the same thing at its end."""
+    """Where the point is not hidden, the next image shows the same object at its end."""
     now, then = reading(sample), reading(following)
     v, u = np.mgrid[: SIZE_PX[1], : SIZE_PX[0]] + 0.5
     flow = now.channels[Channel.FLOW_FORWARD]
@@ -107,7 +107,7 @@ def test_flow_of_the_street_is_that_of_the_next_image(sample: Sample, following:
     found = then.channels[Channel.INSTANCE][row, column][seen]
 
     assert seen.mean() > 0.5
-    # What is left are leaves and poles, narrower than the pixels of so small an image.
+    # The rest are leaves and poles, narrower than the pixels of so small an image.
     assert (ids == found).mean() > 0.98
 
 

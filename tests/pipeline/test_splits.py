@@ -100,7 +100,7 @@ def test_no_warning_where_every_split_has_a_scene() -> None:
 
 
 def test_a_configuration_says_how_scenes_are_assigned() -> None:
-    """At random, unless it says otherwise."""
+    """At random, by default."""
     assert load_config("tabletop").general.splits.assign == "random"
     spec = load_config("tabletop", overrides=("splits.assign=round_robin",))
     assert spec.general.splits.assign == "round_robin"

@@ -36,7 +36,7 @@ def goal(mode: str, *objects: str, scene_index: int = 0, **given: object) -> Arm
 
 
 def test_joint_candidates_are_within_the_share_of_the_limits() -> None:
-    """Shoulder +-2 rad and elbow +-2.5 rad, half of it; fingers are no arm joints."""
+    """Shoulder +-2 rad and elbow +-2.5 rad, half of it; fingers do not count as arm joints."""
     drawn = goal("joints", candidates=40, range_share=0.5)
     shoulder, elbow = np.array(drawn.joint_candidates).T
 

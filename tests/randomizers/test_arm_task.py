@@ -144,7 +144,7 @@ def test_failures_follow_their_shares() -> None:
 
 
 def test_all_attempts_at_a_scene_ask_for_the_same_failure() -> None:
-    """Else what physics refuses more often would be rarer than its share; places differ."""
+    """Otherwise tasks that physics often refuses would be rarer than their share; places differ."""
     failures = Failures(slip=0.3, miss=0.3, collision=0.3)
     task = ArmTask(name="things", task=Constant("free"), tasks={"free": FREE}, failures=failures)
     for scene in range(40):
@@ -182,7 +182,7 @@ def test_an_arm_with_too_few_joints_is_refused(task: Task, needed: str) -> None:
 
 @pytest.mark.parametrize("begins_m", [0.1, 0.45])
 def test_things_lie_where_the_workspace_of_the_arm_begins(begins_m: float) -> None:
-    """As much nearer or farther than those of an arm whose workspace begins at 0.3 m."""
+    """As much nearer or farther as with an arm whose workspace begins at 0.3 m."""
 
     class Reaching(FakeAssets):
         def robot(self, asset_id: str) -> RobotModel:

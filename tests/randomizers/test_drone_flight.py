@@ -1,4 +1,4 @@
-"""Flights of drones: mechanics of coordinated turns, the gimbal, and what it looks at."""
+"""Flights of drones: mechanics of coordinated turns, the gimbal, and its target."""
 
 import math
 from dataclasses import replace
@@ -98,7 +98,7 @@ def test_a_perfect_gimbal_holds_the_horizon_and_a_free_one_banks() -> None:
 
 
 def test_the_airframe_leans_forward_with_speed_and_carries_the_gimbal() -> None:
-    """By the stated angle; the distance of both is that of the template."""
+    """By the stated angle; both keep the template's distance."""
     scene = flown(speed_m_s=10.0, bank_deg=0.0, swing_deg=0.0)
     airframe, gimbal = (scene.body(name).T_world_body for name in ("drone", "drone_gimbal"))
 

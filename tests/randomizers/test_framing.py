@@ -6,7 +6,6 @@ Expected images are projected by OpenCV, and by hand for panoramas.
 import math
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -20,7 +19,8 @@ from gen_data.core.scene import Body, Camera, ObjectGroup, Region, Scene, Suppor
 from gen_data.core.se3 import SE3, Array
 from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.randomizers.framing import Framing, Thing, frame, long_side_share
-from tests.randomizers.doubles import FakeAssets, rng_of
+from tests import opencv
+from tests.randomizers.doubles import FakeAssets, box_of, corners_of, rng_of
 
 LENSES = {
     "pinhole": Intrinsics.from_hfov(640, 480, math.radians(65.0)),
@@ -58,16 +58,11 @@ SCENE = Scene(
 
 def seen_px(points_camera_m: Array, k: Intrinsics) -> Array:
     """Image points, [n, 2], by OpenCV, whose pixel centres and ours differ by the same half."""
-    matrix, coefficients = k.matrix(), np.array(k.lens.coefficients or (0.0,) * 4)
     if k.lens.model == "equirectangular":
         x, y, z = points_camera_m.T
         angles = np.stack([np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))], axis=-1)
         return np.asarray(angles * (k.fx_px, k.fy_px) + (k.cx_px, k.cy_px))
-    points, none = points_camera_m[:, None], np.zeros(3)
-    project = cv2.fisheye.projectPoints if k.lens.model == "kannala_brandt" else cv2.projectPoints
-    if project is cv2.fisheye.projectPoints:
-        return np.asarray(project(points, none, none, matrix, coefficients)[0][:, 0])
-    return np.asarray(cv2.projectPoints(points, none, none, matrix, coefficients)[0][:, 0])
+    return opencv.places(k, points_camera_m)
 
 
 def framed(scene: Scene = SCENE, number: int = 0, **given: object) -> Camera:
@@ -76,16 +71,10 @@ def framed(scene: Scene = SCENE, number: int = 0, **given: object) -> Camera:
     return pose(scene, FakeAssets(), rng_of("close", number, index=number)).cameras[0]
 
 
-def corners_m(body: Body) -> Array:
-    low, high = np.array(FakeAssets().bounds_m(body.asset))
-    steps = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    return body.T_world_body.apply(body.scale * (low + (high - low) * steps))
-
-
 def share_of(body: Body, camera: Camera) -> float:
     """Longer side of a box's image over the longer side of the image, by OpenCV."""
     k = camera.intrinsics
-    points = seen_px(camera.T_world_camera.inverse().apply(corners_m(body)), k)
+    points = seen_px(camera.T_world_camera.inverse().apply(corners_of(body)), k)
     return float(np.ptp(points, axis=0).max()) / max(k.width_px, k.height_px)
 
 
@@ -218,7 +207,7 @@ def test_camera_keeps_its_elevation_room_and_clearance() -> None:
         assert (eye <= SCENE.interior_m[1]).all()
         rises = []
         for body in SCENE.bodies:
-            box = corners_m(body)
+            box = corners_of(body)
             outside = np.maximum(box.min(axis=0) - eye, eye - box.max(axis=0)).max()
             assert outside >= 0.08 - 2e-6
             away = eye - 0.5 * (box.min(axis=0) + box.max(axis=0))
@@ -230,7 +219,7 @@ def test_camera_keeps_its_elevation_room_and_clearance() -> None:
 def test_thing_lies_as_far_from_the_middle_as_was_drawn(off_center: float, gap: float) -> None:
     """A square of the object's size has this share of the free space on its nearer side."""
     camera = framed(off_center=Constant(off_center))
-    centers = [0.5 * (corners_m(b)[0] + corners_m(b)[7]) for b in SCENE.bodies[1:]]
+    centers = [box_of(b)[0] for b in SCENE.bodies[1:]]
     seen = LENSES["pinhole"].project(camera.T_world_camera.inverse().apply(np.array(centers)))
 
     side = 0.3 * 640
@@ -241,7 +230,7 @@ def test_thing_lies_as_far_from_the_middle_as_was_drawn(off_center: float, gap: 
 
 @pytest.mark.parametrize(("aim", "high_m"), [("table", 0.74), ("", 0.86)])
 def test_surface_and_scene_can_be_framed(aim: str, high_m: float) -> None:
-    """The middle of the table's top, and that of the scene's focus, in the middle of the image."""
+    """The middle of the table's top, and of the scene's focus, in the middle of the image."""
     camera = framed(aim=Constant(aim), off_center=Constant(0.0), fills=Constant(0.8))
     middle = camera.T_world_camera.inverse().apply(np.array([0.0, 0.0, high_m]))
 
@@ -250,7 +239,7 @@ def test_surface_and_scene_can_be_framed(aim: str, high_m: float) -> None:
 
 def test_aims_can_be_mixed_and_need_no_share() -> None:
     """A distance in metres, from the centre of the table's top or of one of the objects."""
-    centers = [0.5 * (corners_m(b)[0] + corners_m(b)[7]) for b in SCENE.bodies[1:]]
+    centers = [box_of(b)[0] for b in SCENE.bodies[1:]]
     counts = {"table": 0, "clutter": 0}
     for number in range(40):
         orbit = CameraPose(name="orbit", aim=Choice(("table", "clutter")), jitter_m=Constant(0.0),
@@ -272,7 +261,7 @@ def test_small_shares_are_tried_only_where_the_drawn_one_has_no_place() -> None:
     for clearance_m in (0.0, 0.4):
         camera = framed(fills=either, off_center=Constant(0.0), clearance_m=clearance_m)
         T = camera.T_world_camera.inverse()
-        corners = [LENSES["pinhole"].project(T.apply(corners_m(b))) for b in SCENE.bodies[1:]]
+        corners = [LENSES["pinhole"].project(T.apply(corners_of(b))) for b in SCENE.bodies[1:]]
         ahead = [c for c in corners if np.isfinite(c).all()]
         sides[clearance_m] = [float(np.ptp(c, axis=0).max()) / 640 for c in ahead]
     assert min(abs(side - 0.9) for side in sides[0.0]) < 0.02

@@ -2,14 +2,13 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import ConvexHull, cKDTree
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.config.distributions import Constant, Uniform
 from gen_data.content.procedural import hand_grip
 from gen_data.core.errors import ConfigError, LayoutRejected
@@ -22,12 +21,6 @@ YIELD_M = 0.003
 """Flesh gives way by this much."""
 TOUCH_M = 0.0015
 CONVEX = ("apple?seed=33", "kiwi?seed=7", "toy_block?seed=15", "carton?seed=3", "book?seed=1")
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    folder: Path = tmp_path_factory.mktemp("held")
-    return open_library(cache_dir=folder)
 
 
 def table(*things: str) -> Scene:

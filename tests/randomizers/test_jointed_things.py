@@ -1,4 +1,4 @@
-"""Things with joints of a user: parts, joint labels, and parts that open as far as they can."""
+"""Jointed objects of a user: parts, joint labels, and parts that open as far as they can."""
 
 import math
 from dataclasses import replace

@@ -83,7 +83,7 @@ def test_what_no_camera_has_is_refused(given: dict[str, Any], message: str) -> N
 
 
 def test_the_principal_point_is_offset_along_each_axis_by_its_own() -> None:
-    """2 px to the left, 3.5 px down, from that of the sensor."""
+    """2 px to the left, 3.5 px down, from the sensor's centre."""
     given = {"name": "lens", "camera": "bent", "hfov_deg": None, "principal_offset_px": [-2, 3.5]}
     lens = CameraIntrinsics.model_validate_json(json.dumps(given))
     k = lens(SCENE, FakeAssets(), rng_of("lens")).camera("bent").intrinsics

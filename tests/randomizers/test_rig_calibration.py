@@ -63,7 +63,7 @@ def test_turns_are_as_large_as_they_say() -> None:
 
 
 def test_the_world_knows_where_the_sensors_are() -> None:
-    """World poses, from which calibration files are written, are those of the moved sensors."""
+    """World poses, from which calibration files are written, belong to the moved sensors."""
     scene = drawn()
     T_world_rig = scene.rig_pose("ego")
 

@@ -59,7 +59,7 @@ def test_an_orbiting_stand_keeps_its_pair_rectified() -> None:
 
 
 def test_everything_on_a_stand_moves_with_it() -> None:
-    """The scanner's place as seen by a camera is that of its mount."""
+    """The scanner's place as seen by a camera is its mount's."""
     before, after = pair(), posed(pair(), azimuth_deg=Constant(40.0))
 
     def seen(scene: Scene) -> se3.SE3:

@@ -129,7 +129,7 @@ def test_modules_are_compiled_for_a_kind_of_gpu_without_one(tmp_path: Path) -> N
 
 
 def test_modules_are_copied_without_sources_and_never_over_others(tmp_path: Path) -> None:
-    """Unfinished folders and those of other packages stay behind."""
+    """Unfinished folders and other packages' stay behind."""
     source, target = tmp_path / "source", tmp_path / "target"
     for name in ("wp_gen_data.a_1", "wp_gen_data.b_2", "wp_gen_data.c_3_p7_t8", "wp_other_4"):
         (source / name).mkdir(parents=True)
@@ -172,7 +172,7 @@ def _loaded_modules(program: str) -> set[tuple[str, str]]:
 
 
 def _run(program: str, arguments: Sequence[str] = (), environment: Mapping[str, str] = {}) -> str:
-    """What a program in a process of its own prints, Warp's reports included."""
+    """Output of a program in a separate process, Warp's reports included."""
     done = subprocess.run(
         [sys.executable, "-c", _REPORT_MODULES + program, *arguments],
         check=True, capture_output=True, text=True, env={**os.environ, **environment},

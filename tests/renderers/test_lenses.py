@@ -21,6 +21,7 @@ from gen_data.renderers.warp.scene.kernels.distortion import project_to_pixel
 from gen_data.renderers.warp.scene.kernels.records import View
 from gen_data.renderers.warp.scene.scene_packing import pack_view
 from gen_data.renderers.warp.visibility.amodal import bounding_cone
+from tests import opencv
 from tests.embree import RayCaster, placed
 from tests.renderers.embree import near_edges
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, room_mesh, sphere_mesh
@@ -79,19 +80,10 @@ def opencv_rays(k: Intrinsics) -> np.ndarray:
         plane = cv2.undistortPoints(places, k.matrix(), coefficients)[:, 0]
         for _ in range(300):
             points = np.column_stack([plane, np.ones(len(plane))])
-            plane -= (opencv_places(k, points) - places[:, 0]) / (k.fx_px, k.fy_px)
+            plane -= (opencv.places(k, points) - places[:, 0]) / (k.fx_px, k.fy_px)
     rays = np.column_stack([plane, np.ones(len(plane))])
     rays /= np.sqrt((rays * rays).sum(axis=1))[:, None]
     return rays.reshape(k.height_px, k.width_px, 3)
-
-
-def opencv_places(k: Intrinsics, points: np.ndarray) -> np.ndarray:
-    function = cv2.fisheye if k.lens.model == "kannala_brandt" else cv2
-    found, _ = function.projectPoints(
-        points.reshape(-1, 1, 3), np.zeros(3), np.zeros(3), k.matrix(),
-        np.array(k.lens.coefficients),
-    )  # fmt: skip
-    return found[:, 0]
 
 
 def turned(seed: int) -> tuple[float, float, float, float]:
@@ -151,7 +143,7 @@ def test_ranges_are_embrees_along_opencvs_directions(name: str) -> None:
     ]
     k = CAMERAS[name]
     rays = opencv_rays(k)
-    trusted = np.abs(opencv_places(k, rays) - pixel_centres(k)).max(axis=1) < 1e-3
+    trusted = np.abs(opencv.places(k, rays) - pixel_centres(k)).max(axis=1) < 1e-3
     trusted = trusted.reshape(k.height_px, k.width_px)
     library = FakeLibrary(MESHES)
     hits = RayCaster(*(placed(body, library) for body in bodies)).cast((0.0, 0.0, 0.0), rays)
@@ -203,7 +195,7 @@ def test_the_mask_of_a_box_ends_where_opencv_puts_its_edges(name: str) -> None:
         for axis in range(3)
         for pair in ends
     ]
-    places = opencv_places(k, body.T_world_body.apply(np.concatenate(lines)))
+    places = opencv.places(k, body.T_world_body.apply(np.concatenate(lines)))
 
     rows, columns = np.nonzero(rendered(scene_of(body), ahead(k)).channels[Channel.INSTANCE])
 
@@ -224,7 +216,7 @@ def test_object_coordinates_are_seen_where_opencv_projects_them(name: str) -> No
 
     seen = channels[Channel.INSTANCE].ravel() == 1
     coordinates = channels[Channel.OBJECT_COORDINATES].reshape(-1, 3)[seen].astype(np.float64)
-    places = opencv_places(k, pose.apply(coordinates - 0.5))
+    places = opencv.places(k, pose.apply(coordinates - 0.5))
     assert seen.sum() > 1000
     np.testing.assert_allclose(places, pixel_centres(k)[seen], atol=0.05)
 

@@ -285,7 +285,7 @@ def flip_of(reference: np.ndarray, image: np.ndarray) -> float:
 def worst_p(a: np.ndarray, b: np.ndarray) -> float:
     """Probability that equal means differ as much in some pixel as they do; images [n, h, w, 3].
 
-    Pixels that hardly vary are compared as if both varied by a ten-thousandth of what they see:
+    Pixels that vary little are compared as if both varied by a ten-thousandth of their light:
     float arithmetic differs by more than their noise.
     """
     n, m = len(a), len(b)

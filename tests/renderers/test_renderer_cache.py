@@ -150,7 +150,7 @@ def test_stored_hierarchies_and_mip_levels_give_the_same_image() -> None:
 
 
 def filling(allocate: Callable[..., wp.array], byte: int) -> Callable[..., wp.array]:
-    """What returns memory of the CPU, filled with a byte."""
+    """An allocator of memory of the CPU, filled with a byte."""
 
     def filled(*arguments: Any, **options: Any) -> wp.array:
         array = allocate(*arguments, **options)

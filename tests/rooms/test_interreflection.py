@@ -12,7 +12,7 @@ from gen_data.core.scene import Body, Camera, Environment, IrradianceVolume, Lig
 from gen_data.core.se3 import SE3, Vec3, look_at
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.settings import RenderSettings
-from gen_data.rooms.interreflection import AXES, Hole, LitRoom, find_interreflection
+from gen_data.rooms.interreflection import Hole, LitRoom, find_interreflection
 from gen_data.rooms.lit_rooms import find_lit_rooms
 from tests.rooms.test_layouts import library, nominal
 
@@ -50,7 +50,7 @@ def test_a_red_floor_colours_what_comes_from_below() -> None:
 
 
 def test_before_a_window_wall_light_comes_from_the_room() -> None:
-    """A panel at -X lights all sides but its own, which is darker than what is before it."""
+    """A panel at -X lights all sides but its own, which is darker than its opposite."""
     room = LitRoom((0.0, 0.0, 0.0), (6.0, 4.0, 2.5), grey(0.6))
     panel = Light(
         "window", "rectangle", (0.05, 2.0, 1.5), (1.0, 0.0, 0.0), intensity_cd=3000.0,
@@ -75,7 +75,7 @@ def two_rooms(openness: float) -> tuple[LitRoom, LitRoom]:
 
 
 def test_light_passes_open_doors_only() -> None:
-    """A dark room beside a lit one is black behind a closed door, dim behind an open one."""
+    """A dark room next to a lit one is black behind a closed door, dim behind an open one."""
     bulb = [lamp((1.5, 1.5, 2.2), 1000.0)]
     closed, half, wide = (
         [light_of(v).mean() for v in find_interreflection(two_rooms(share), bulb)]
@@ -153,8 +153,3 @@ def test_an_empty_room_agrees_with_paths(kind: str) -> None:
         images.append(read.channels[Channel.RADIANCE].reshape(2, 18, 2, 24, 3).mean(axis=(1, 3, 4)))
 
     assert images[0] == pytest.approx(images[1], rel=0.12)
-
-
-def test_sides_are_numbered_by_their_outward_axes() -> None:
-    """+X, -X, +Y, -Y, +Z, -Z."""
-    assert AXES.tolist() == [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]

@@ -134,7 +134,7 @@ def test_no_two_pieces_overlap(kind: str, seeds: range) -> None:
 
 
 def _is_inside_shelf(a: Body, b: Body) -> bool:
-    """Whether one of two is a shelf or seat, whose box, with back or tap, holds what is on it."""
+    """Whether one of two is a shelf or seat, whose box, with back or tap, holds its load."""
     shelves = {
         "armchair", "bookcase", "chair", "pallet_rack", "sofa", "steel_rack", "trolley",
         "wash_basin",
@@ -143,7 +143,7 @@ def _is_inside_shelf(a: Body, b: Body) -> bool:
 
 
 def _is_stored(thing: Body, holder: Body) -> bool:
-    """Whether the box of a cupboard or bench holds a thing's, or clothes hang around a chair."""
+    """Whether the box of a cupboard or bench holds an object's, or clothes hang around a chair."""
     if family(thing) == "draped_clothes":
         return family(holder) in {"chair", "office_chair"}
     if family(holder) not in {"kitchen_unit", "refrigerator", "wall_unit", "wardrobe", "workbench"}:
@@ -196,7 +196,7 @@ def test_pieces_that_need_a_wall_touch_one(kind: str, seeds: range) -> None:
 @each
 @first_seeds
 def test_small_things_stand_on_something(kind: str, seeds: range) -> None:
-    """Under the middle of what is not on the floor, a wall or the ceiling, there is a surface."""
+    """Under the middle of objects off the floor, walls and ceiling, there is a surface."""
     hung = {
         "bathroom_cabinet", "coat_hooks", "draped_clothes", "light_switch", "notice_board",
         "parts_bins", "pegboard", "roll_holder", "socket", "utensil_rail", "wall_calendar",

@@ -1,6 +1,6 @@
 """Physics confirms that furnished rooms are at rest.
 
-Bullet simulates them with exact triangle meshes of what is fixed, and the convex hulls of all else.
+Bullet simulates them with exact triangle meshes of fixed objects, and the convex hulls of others.
 """
 
 import math
@@ -43,7 +43,7 @@ HOLLOW = {
     "side_table", "sofa", "steel_rack", "tool_cabinet", "trolley", "tv_stand", "wardrobe",
     "washing_machine", "workbench",
 }  # fmt: skip
-"""What may carry or contain others, for which a convex hull has no room; simulated by itself."""
+"""They may carry or contain others, for which a convex hull has no room; simulated by itself."""
 SOFT = {"rug"}
 """Gives way to the feet of furniture."""
 PACKS = Path(os.environ.get("GEN_DATA_TEST_ASSETS", "missing"), "packs")
@@ -56,7 +56,7 @@ STEP_S = 1.0 / 240.0
 MOVE_M, TURN_DEG = 0.01, 8.0
 """More is a fall; feet of bins, speakers and dogs are some tenths of a millimetre apart."""
 SCALE = 20.0
-"""Of the simulated world: Bullet keeps hulls 1 to 2 mm apart, on which small things would roll."""
+"""Of the simulated world: Bullet keeps hulls 1 to 2 mm apart, on which small objects would roll."""
 DENSITY_KG_M3 = 300.0
 
 
@@ -110,7 +110,7 @@ class Bullet:
         self.starts[number] = name, center
 
     def fallen(self, seconds: float = 2.0) -> dict[str, tuple[float, float]]:
-        """How far [m] and by how much [deg] things have moved that were not at rest."""
+        """How far [m] and by how much [deg] objects have moved that were not at rest."""
         for _ in range(round(seconds / STEP_S)):
             self.pb.stepSimulation(**self.here)
         found = {}
@@ -128,7 +128,7 @@ def bullet() -> Iterator[Bullet]:
     pb = pytest.importorskip("pybullet")
     client = pb.connect(pb.DIRECT)
     pb.setGravity(0.0, 0.0, -9.81 * SCALE, physicsClientId=client)
-    # With fewer, things creep by millimetres a second on level boards.
+    # With fewer, objects creep by millimetres a second on level boards.
     pb.setPhysicsEngineParameter(numSolverIterations=200, physicsClientId=client)
     try:
         yield Bullet(client)
@@ -144,7 +144,7 @@ def kind_of(body: Body, assets: AssetLibrary) -> str:
 
 
 def settle(scene: Scene, assets: AssetLibrary) -> tuple[int, dict[str, tuple[float, float]]]:
-    """Number of things in a room that could fall, and those that did."""
+    """Number of objects in a room that could fall, and all fallen ones."""
     instances: dict[int, list[Body]] = {}
     for body in scene.bodies:
         if body.collides and kind_of(body, assets) not in SOFT:
@@ -162,7 +162,7 @@ def settle(scene: Scene, assets: AssetLibrary) -> tuple[int, dict[str, tuple[flo
 @NEEDS_CATALOGUE
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_falls_in_five_rooms_with_furniture_of_packs(kind: str) -> None:
-    """Models of the catalogue stand, and carry what is on them."""
+    """Models of the catalogue stand, and carry the objects on them."""
     assets = open_library((), packs=PACKS)
     results = [settle(furnished(kind, seed, assets), assets) for seed in range(5)]
     assert sum(number for number, _ in results) > 10
@@ -175,7 +175,7 @@ def test_nothing_falls_in_five_rooms_with_furniture_of_packs(kind: str) -> None:
     *(pytest.param(k, marks=pytest.mark.exhaustive) for k in (1, 2)),
 ])  # fmt: skip
 def test_nothing_falls_in_a_room_of_each_type(kind: str, seed: int) -> None:
-    """Two seconds of simulation: tables, shelves and floors carry what is on them."""
+    """Two seconds of simulation: tables, shelves and floors carry the objects on them."""
     number, fallen = settle(furnished(kind, seed), library())
     assert number > 5
     assert fallen == {}

@@ -1,4 +1,4 @@
-"""Surfaces that carry things and are not tops: seats, rims and trays."""
+"""Surfaces that carry objects and are not tops: seats, rims and trays."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ SIDE = 24
 
 
 def heights_m(asset_id: str) -> np.ndarray:
-    """What rays from above meet over the surface, relative to its height, [SIDE^2]."""
+    """Heights at which rays from above end over the surface, relative to its height, [SIDE^2]."""
     mesh = library().mesh(asset_id)
     corners = [k.position_m for k in library().keypoints(asset_id) if k.name == SUPPORT]
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
@@ -25,7 +25,7 @@ def heights_m(asset_id: str) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["armchair", "chair", "sofa", "trolley", "wash_basin"])
 def test_nothing_sticks_out_of_a_surface_that_carries_things(family: str) -> None:
-    """Neither piping nor pillows nor throws: things would stand in them. Cushions sag a little."""
+    """Neither piping nor pillows nor throws: objects would stand in them. Cushions sag a little."""
     variants = [a.asset_id for a in library().find(()) if a.asset_id.startswith(f"{family}?")]
     assert len(variants) >= 8
     for asset_id in variants:

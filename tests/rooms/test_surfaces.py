@@ -1,4 +1,4 @@
-"""What covers the walls of rooms: pale paint, one wall that stands out, tiles by worktops."""
+"""Covers of the walls of rooms: pale paint, one wall that stands out, tiles by worktops."""
 
 import colorsys
 from functools import cache

@@ -1,4 +1,4 @@
-"""What is outside rooms, hangs at their windows and runs from their taps."""
+"""Surroundings outside rooms, blinds at their windows and water from their taps."""
 
 import math
 
@@ -44,7 +44,7 @@ def test_surroundings_stand_on_one_ground_outside_all_rooms(kind: str) -> None:
 
 @pytest.mark.slow
 def test_assets_of_surroundings_are_announced() -> None:
-    """Plans list them, so that their content is part of the data set's identity."""
+    """Plans list them, so that their content is in the data set's identity."""
     possible = set(Furnish(name="f").possible_assets(library()))
 
     assert set(outlook_assets()) <= possible
@@ -73,7 +73,7 @@ def test_blinds_hang_within_the_frames_of_their_windows() -> None:
     ("kind", "piece"), [("kitchen", "kitchen_sink"), ("bathroom", "wash_basin")]
 )
 def test_running_taps_are_stated_and_seen(kind: str, piece: str) -> None:
-    """Water falls from above the basin to its bottom; without it the label says off."""
+    """Water falls from above the basin to its bottom; without it the label is off."""
     scene = furnished(kind, 1)
     runs, off = (
         ObjectStates(name="s", runs=flag)(scene, library(), Streams(5, 1).rng("s"))
@@ -96,7 +96,7 @@ def test_running_taps_are_stated_and_seen(kind: str, piece: str) -> None:
 
 @pytest.mark.slow
 def test_vessels_say_whether_they_are_full() -> None:
-    """As their assets say what is in them."""
+    """Their assets name their contents."""
     stated = [
         (dict(i.attributes)["full"], bool(dict(library().get(i.asset).attributes).get("contents")))
         for seed in range(6)

@@ -48,7 +48,7 @@ def states(scene: Scene, **fields: dist.Numeric[bool]) -> Scene:
 
 @pytest.mark.slow
 def test_closed_parts_are_where_their_pieces_are_and_say_so() -> None:
-    """With no opening, parts stay as they were, and every label says 0."""
+    """With no opening, parts stay as they were, and every label is 0."""
     closed = states(flat(), is_open=OFF)
     parts = [b for b in closed.bodies if b.part_id == 2]
     attributes = [dict(closed.instance(b.instance_id).attributes) for b in parts]
@@ -218,7 +218,7 @@ def test_a_carrier_too_wide_for_a_room_is_rejected_with_a_remedy() -> None:
 
 @pytest.mark.slow
 def test_the_map_of_a_room_agrees_with_outlines() -> None:
-    """Occupied cells are in a box of what stands; free ones at most in its empty corners."""
+    """Occupied cells are in a box of a standing piece; free ones at most in its empty corners."""
     scene = states(flat(), is_open=OFF)
     truth = sample.EgoTruth(rig="carrier", T_world_ego=se3.SE3((0.0, 0.0, 0.0)))
     made = (

@@ -1,4 +1,4 @@
-"""What hangs on walls: motifs that differ, frames of usual sizes."""
+"""Pictures on walls: motifs that differ, frames of usual sizes."""
 
 from functools import cache
 from itertools import combinations

@@ -34,7 +34,7 @@ def test_what_faces_outdoors_has_its_light_and_what_faces_the_room_none_of_it(si
 
 
 def test_a_niche_reaches_as_far_as_its_hole_and_its_sill() -> None:
-    """Walls beside the window, and the floor before it, keep the light of the room."""
+    """Walls next to the window, and the floor before it, keep the light of the room."""
     hole = Hole(0, (4.0, 1.0, 0.9), (4.0, 2.2, 2.1))
 
     (niche,) = find_niches([room(hole)], [DIM], (OUTSIDE_CD_M2,) * 3)

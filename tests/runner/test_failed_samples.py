@@ -103,7 +103,7 @@ def test_the_bytes_depend_on_the_plan_and_failed_samples(tmp_path: Path, index: 
 def test_whatever_a_plug_in_raises_fails_its_sample_alone(
     tmp_path: Path, error: BaseException, workers: int
 ) -> None:
-    """Also what would end a process, and what has no text."""
+    """Also errors that would end a process or have no text."""
     trouble = Trouble(errors={5: error})
     summary = make(tmp_path, trouble=trouble, settings=SKIP, workers=workers)
     assert summary.failed == (FailedSample(5, "sample", type(error).__name__),)
@@ -208,7 +208,7 @@ def test_repair_tries_failed_samples_again(tmp_path: Path) -> None:
 
 
 def test_stored_samples_have_the_indices_that_exist_and_their_files(tmp_path: Path) -> None:
-    """Each is found by its own number; a failed one has an error that says why."""
+    """Each is found by its own number; a failed one has an error with the reason."""
     make(tmp_path, trouble=Trouble(errors={i: ValueError() for i in (4, 5)}), settings=SKIP)
     stored = StoredSamples(tmp_path)
     assert stored.n == 8

@@ -9,7 +9,7 @@ from tests.randomizers.doubles import FakeAssets
 
 
 def scene(asset: str | tuple[str, ...]) -> Scene:
-    """A robot on the ground; the library knows no other than ``two_link``."""
+    """A robot on the ground; the library has only ``two_link``."""
     return Robot(name="arm", asset=asset).add(Scene("test"), FakeAssets())
 
 

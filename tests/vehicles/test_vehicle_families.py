@@ -151,6 +151,7 @@ def test_lamp_keypoints_lie_at_the_lamps(built: tuple[str, Solid]) -> None:
 def test_slots_have_the_roles_that_randomizers_look_for(built: tuple[str, Solid]) -> None:
     """Cars, vans, trucks, buses and motorcycles have all lamps; bicycles have two."""
     name, solid = built
+    seed = next(seed for seed in range(_few(name)) if variant(name, seed) is solid)
     roles = {material.role for material in solid.mesh.materials}
     if name in ("bicycle", "cyclist"):
         assert {"paint", "tyre", "rim", "trim", *LAMPS} <= roles
@@ -160,16 +161,8 @@ def test_slots_have_the_roles_that_randomizers_look_for(built: tuple[str, Solid]
         assert roles >= ROLES
     assert ({"skin", "top", "bottom", "shoes"} <= roles) == (
         FAMILIES[name].facts is not None
-        and FAMILIES[name].facts(seed=_seed_of(built)).attributes.get("rider") == "yes"
+        and FAMILIES[name].facts(seed=seed).attributes.get("rider") == "yes"
     )
-
-
-def _seed_of(built: tuple[str, Solid]) -> int:
-    name, solid = built
-    for seed in range(_few(name)):
-        if variant(name, seed) is solid:
-            return seed
-    raise AssertionError("no seed makes this mesh")
 
 
 @for_every_variant
@@ -195,15 +188,19 @@ def test_shell_and_glass_are_symmetric(name: str) -> None:
         assert keys == twins
 
 
+def all_around(turns: int, rises_rad: list[float]) -> Array:
+    """Unit vectors [turns * rises, 3] in all directions of the compass, by their elevations."""
+    turn, rise = np.meshgrid(np.linspace(0, 2 * math.pi, turns, endpoint=False), rises_rad)
+    level = np.cos(rise)
+    return np.stack([np.cos(turn) * level, np.sin(turn) * level, np.sin(rise)], -1).reshape(-1, 3)
+
+
 @pytest.mark.parametrize("name", FOUR_WHEELED)
 def test_body_faces_outward_wherever_it_is_seen(name: str) -> None:
     """Rays from all around meet paint, glass and lamps from in front, as do their normals."""
     mesh = variant(name, 1).mesh
     roles = [m.role for m in mesh.materials]
-    turn, rise = np.meshgrid(np.linspace(0, 2 * math.pi, 60, endpoint=False), [0.05, 0.3, 0.8])
-    away = np.stack(
-        [np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)], axis=-1
-    ).reshape(-1, 3)
+    away = all_around(60, [0.05, 0.3, 0.8])
     low, high = mesh.bounds_m()
     for share in (0.2, 0.5, 0.8):
         target = np.array([low[0] + share * (high[0] - low[0]), 0.0, 0.45 * high[2]])
@@ -222,10 +219,7 @@ def test_nothing_inside_sticks_out(name: str, seed: int) -> None:
     """Rays from all around meet panes, paint or trim before seats, linings and floor."""
     mesh = variant(name, seed).mesh
     roles = [m.role for m in mesh.materials]
-    turn, rise = np.meshgrid(np.linspace(0, 2 * math.pi, 40, endpoint=False), [0.05, 0.4])
-    away = np.stack(
-        [np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)], axis=-1
-    ).reshape(-1, 3)
+    away = all_around(40, [0.05, 0.4])
     low, high = mesh.bounds_m()
     met = []
     for share in np.linspace(0.06, 0.94, 9):
