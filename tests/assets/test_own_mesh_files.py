@@ -334,6 +334,43 @@ def test_3mf_builds_components_in_their_unit_with_their_colours(tmp_path: Path) 
     assert soup.colors[:, 0].tolist() == ([[1, 0, 0]] * 3 + [[0, 0, 1]]) * 2
 
 
+@pytest.mark.parametrize(("alphas", "told"), [
+    ((255, 255, 255), ()), ((0, 0, 0), ()),
+    ((255, 90, 255), ("the opacity of vertices (alpha) is not used",)),
+])  # fmt: skip
+def test_opacity_of_vertices_of_ply_is_named(
+    tmp_path: Path, alphas: tuple[int, ...], told: tuple[str, ...]
+) -> None:
+    """Where it varies: a constant one is a placeholder."""
+    head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+    colors = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue", "alpha"))
+    face = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    places = ((0, 0), (1, 0), (0, 1))
+    rows = [f"{x} {y} 0 255 0 0 {a}\n" for (x, y), a in zip(places, alphas, strict=True)]
+    (tmp_path / "a.ply").write_text(
+        f"{head}property float z\n{colors}{face}{''.join(rows)}3 0 1 2\n"
+    )
+    assert read_mesh(Folder(tmp_path), "a.ply").remarks == told
+
+
+@pytest.mark.parametrize(("alpha", "told"), [
+    ("", ()), ("FF", ()), ("40", ("the opacity of colours is not used",)),
+])  # fmt: skip
+def test_opacity_of_colours_of_3mf_is_named(
+    tmp_path: Path, alpha: str, told: tuple[str, ...]
+) -> None:
+    model = (
+        '<model unit="millimeter"><resources><basematerials id="5"><base name="a" '
+        f'displaycolor="#FF0000{alpha}"/></basematerials><object id="1" pid="5" pindex="0"><mesh>'
+        '<vertices><vertex x="0" y="0" z="0"/><vertex x="9" y="0" z="0"/>'
+        '<vertex x="0" y="9" z="0"/></vertices><triangles><triangle v1="0" v2="1" v3="2"/>'
+        '</triangles></mesh></object></resources><build><item objectid="1"/></build></model>'
+    )
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    assert read_mesh(Folder(tmp_path), "a.3mf").remarks == told
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("text", "metres"), [
     (step_box((10, 20, 30), color=(1.0, 0.5, 0.0)), 0.001),

@@ -310,6 +310,8 @@ def _build_soup(
     colors = None if textured else _read_colors(vertex, face, corner, polygon, remarks)
     if textured and (_is_colored(_srgb(vertex)) or _is_colored(_srgb(face))):
         remarks.append("vertex and face colours are not used next to an image")
+    if colors is not None and _is_transparent(vertex):
+        remarks.append("the opacity of vertices (alpha) is not used")
     if images and not textured:
         remarks.append(f"the image {images[0]} is not used: there are no texture coordinates")
     plain = MaterialSlot() if colors is None else MaterialSlot(material=WHITE, from_file=True)
@@ -376,6 +378,12 @@ def _read_colors(
             remarks.append("face colours are not used next to vertex colours")
         return by_vertex[corner]
     return None if by_face is None else np.repeat(by_face[polygon][:, None], 3, axis=1)
+
+
+def _is_transparent(vertex: _Columns) -> bool:
+    """Whether some vertices, but not all, have less opacity than others."""
+    alpha = vertex.get("alpha")
+    return isinstance(alpha, np.ndarray) and bool(alpha.max() - alpha.min() > 0.02 * alpha.max())
 
 
 def _varies(colors: Float64 | None) -> bool:

@@ -25,6 +25,8 @@ _MAX_ELEMENTS = 4 * MAX_FACES
 _MAX_BYTES = 512 * 1024 * 1024
 _MAX_PARTS = 10_000
 _MAX_DEPTH = 16
+_OPAQUE = 250
+"""Least alpha [1/255] that counts as opaque."""
 _UNUSED = {
     "texture2dgroup": "images are not used",
     "compositematerials": "mixed materials are not used",
@@ -114,6 +116,8 @@ def _parse_model(package: _Package, name: str) -> _Model:
             objects[part.attrib["id"]] = part
         elif kind in ("basematerials", "colorgroup"):
             values = [e.get("displaycolor") or e.get("color") or "#FFFFFF" for e in part]
+            if any(len(v.strip()) == 9 and int(v.strip()[7:], 16) < _OPAQUE for v in values):
+                package.remarks.add("the opacity of colours is not used")
             colors[part.attrib["id"]] = _linear_colors(values)
         elif kind == "item":
             items.append(part)
