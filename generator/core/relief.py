@@ -93,17 +93,18 @@ class RoadProfile:
 
     def weigh(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
         """Its heights at places [m, n], and their weights, which fall with the distance from it."""
-        s, t, far_m = self._along_and_left(x_m, y_m)
+        s, t = self._along_and_left(x_m, y_m)
         beyond = s - np.clip(s, 0.0, self.length_m)
         aside = np.maximum(np.abs(t) - self.half_width_m, 0.0)
         weight = 1.0 / np.square(beyond * beyond + aside * aside + _SOFT_M2)
         height = self.height(s) + self._bank(s, t) + self._land(t)
-        if far_m is not None:
+        if self.bends:
             # Where legs of the road are equally near, the nearest one would change at a step.
             first, last = self._inside_m()
-            share = np.clip((np.abs(t) - first) / (last - first), 0.0, 1.0)
+            far = np.abs(t) > first
+            share = np.clip((np.abs(t[far]) - first) / (last - first), 0.0, 1.0)
             share = share * share * (3.0 - 2.0 * share)
-            height = (1.0 - share) * height + share * far_m
+            height[far] = (1.0 - share) * height[far] + share * self._far(x_m[far], y_m[far])
         return height, weight
 
     def _land(self, t_m: Array) -> Array:
@@ -157,44 +158,49 @@ class RoadProfile:
         bent = (self._heading(s + step) - self._heading(s - step)) / (2.0 * step)
         return np.column_stack([s, x, y, self._heading(s), bent])
 
-    def _along_and_left(self, x_m: Array, y_m: Array) -> tuple[Array, Array, Array | None]:
-        """Arc lengths and distances to the left of the nearest points of the line.
-
-        With bends also the smooth height of land far from the line, by Shepard's weights.
-        """
+    def _along_and_left(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
+        """Arc lengths and distances to the left of the nearest points of the line."""
         if self.bends:
             return self._near_bends(x_m, y_m)
         c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
         u = c * (x_m - self.x_m) + s * (y_m - self.y_m)
         v = c * (y_m - self.y_m) - s * (x_m - self.x_m)
         if self.curvature_per_m == 0.0:
-            return u, v, None
+            return u, v
         side, radius = np.sign(self.curvature_per_m), 1.0 / abs(self.curvature_per_m)
         along = radius * np.arctan2(u, radius - side * v)
-        return along, side * (radius - np.hypot(u, radius - side * v)), None
+        return along, side * (radius - np.hypot(u, radius - side * v))
 
-    def _near_bends(self, x_m: Array, y_m: Array) -> tuple[Array, Array, Array]:
+    def _near_bends(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
         stations = self._stations()
         best, nearest = np.full(x_m.shape, np.inf), np.zeros(x_m.shape, np.int64)
-        total, heights = np.zeros(x_m.shape), np.zeros(x_m.shape)
-        z = self.height(stations[:, 0])
-        for number, (_, x, y, heading, _) in enumerate(stations):
+        for number, (_, x, y, _, _) in enumerate(stations):
             dx, dy = x_m - x, y_m - y
             square = dx * dx + dy * dy
-            nearest = np.where(square < best, number, nearest)
-            best = np.minimum(square, best)
-            weight = 1.0 / np.square(square + CELL_M * CELL_M)
-            total += weight
-            heights += weight * (
-                z[number] + self._land(np.cos(heading) * dy - np.sin(heading) * dx)
-            )
+            nearest[square < best] = number
+            np.minimum(square, best, out=best)
         at, x, y, heading, bent = np.moveaxis(stations[nearest], -1, 0)
         c, s = np.cos(heading), np.sin(heading)
         u, v = c * (x_m - x) + s * (y_m - y), c * (y_m - y) - s * (x_m - x)
         # The line near a station is its arc of curvature.
         side, radius = np.where(bent < 0.0, -1.0, 1.0), 1.0 / np.maximum(np.abs(bent), 1e-7)
         along = at + radius * np.arctan2(u, radius - side * v)
-        return along, side * (radius - np.hypot(u, radius - side * v)), heights / total
+        return along, side * (radius - np.hypot(u, radius - side * v))
+
+    def _far(self, x_m: Array, y_m: Array) -> Array:
+        """Smooth heights [n] of land far from the line, by Shepard's weights."""
+        stations = self._stations()
+        total, heights = np.zeros(x_m.shape), np.zeros(x_m.shape)
+        z = self.height(stations[:, 0])
+        for number, (_, x, y, heading, _) in enumerate(stations):
+            dx, dy = x_m - x, y_m - y
+            square = dx * dx + dy * dy
+            weight = 1.0 / np.square(square + CELL_M * CELL_M)
+            total += weight
+            land_m = self._land(np.cos(heading) * dy - np.sin(heading) * dx)
+            heights += weight * (z[number] + land_m)
+        smooth: Array = heights / total
+        return smooth
 
 
 @dataclass(frozen=True, slots=True)

@@ -174,7 +174,8 @@ def _lift_bodies(
     for body in level:
         first.setdefault(body.instance_id, body)
     leaders = {body.name: first[body.instance_id] if body.instance_id else body for body in level}
-    standing = [b for b in level if leaders[b.name] is b and not _is_draped(b)]
+    draped = {body.name for body in level if _is_draped(body)}
+    standing = [b for b in level if leaders[b.name] is b and b.name not in draped]
     land = house_entrances.Land.of(lanes, relief)
     feet = [_in_garden(_foot(body, assets), body, land.ways, assets) for body in standing]
     corners = np.concatenate(
@@ -184,11 +185,13 @@ def _lift_bodies(
     heights = relief.height(corners.reshape(-1, 3)).reshape(-1, 4)
     moves = {
         body.name: _move(foot.stance, points, z, sky_m)
-        for body, foot, points, z in zip(standing, feet, corners, heights, strict=True)
+        for body, foot, points, z in zip(
+            standing, feet, corners.tolist(), heights.tolist(), strict=True
+        )
     }
     bodies: list[Body] = []
     for body in level:
-        if _is_draped(body):
+        if body.name in draped:
             parsed = asset_ids.parse_asset_id(body.asset)
             asset = drape.draped_id(parsed, body.T_world_body, body.scale, relief)
             bodies.append(replace(body, asset=asset))
@@ -197,10 +200,11 @@ def _lift_bodies(
             move = moves[leaders[body.name].name]
             moves[body.name] = move
             bodies.append(replace(body, T_world_body=(move @ body.T_world_body).rounded()))
-    for body, foot, z in zip(standing, feet, heights, strict=True):
-        if foot.stance in _BUILT and np.ptp(z) > 0.0:
-            bodies += _base(body, foot, z, assets)
-        if foot.stance == "raised" and np.ptp(z) > 0.0:
+    for body, foot, z in zip(standing, feet, heights.tolist(), strict=True):
+        if foot.stance not in _BUILT or max(z) == min(z):
+            continue
+        bodies += _base(body, foot, z, assets)
+        if foot.stance == "raised":
             floor_m = _floor_m(foot.stance, z)
             bodies += house_entrances.entrances(body, floor_m, level, land, assets)
     return tuple(bodies), moves
@@ -212,46 +216,54 @@ def _is_draped(body: Body) -> bool:
     return x == y == 0.0 and families.declared(body.asset, drape.FACT, None) is not None
 
 
-def _move(stance: Stance, corners: Array, z: Array, sky_m: float) -> SE3:
+def _move(
+    stance: Stance, corners: Sequence[Sequence[float]], z: Sequence[float], sky_m: float
+) -> SE3:
     """``T_lifted_level`` of something by its points on the ground [4, 3] and their heights [4]."""
     if stance == "flown":
         return SE3((0.0, 0.0, sky_m))
     if stance == "upright":
-        return SE3((0.0, 0.0, float(z.min())))
+        return SE3((0.0, 0.0, min(z)))
     if stance in _BUILT:
         return SE3((0.0, 0.0, _floor_m(stance, z)))
     if stance == "centred":
-        return SE3((0.0, 0.0, float(z.mean())))
+        return SE3((0.0, 0.0, _mean(*z)))
     return _tilt(corners, z)
 
 
-def _tilt(corners: Array, z: Array) -> SE3:
+def _mean(a: float, b: float, c: float, d: float) -> float:
+    return (a + b + c + d) / 4.0
+
+
+def _tilt(corners: Sequence[Sequence[float]], z: Sequence[float]) -> SE3:
     """The motion of a plane, level at 0, onto the one nearest to the raised corners.
 
-    Headings in plan stay: it turns about the level line across the steepest slope.
+    Headings in plan stay: it turns about the level line across the steepest slope. Number by
+    number: a street has hundreds of bodies with four corners each.
     """
-    ahead = 0.5 * (corners[2] + corners[3] - corners[0] - corners[1])[:2]
-    left = 0.5 * (corners[1] + corners[3] - corners[0] - corners[2])[:2]
-    rise = 0.5 * np.array([z[2] + z[3] - z[0] - z[1], z[1] + z[3] - z[0] - z[2]])
+    (x0, y0, _), (x1, y1, _), (x2, y2, _), (x3, y3, _) = corners
+    z0, z1, z2, z3 = z
+    ahead_x, ahead_y = 0.5 * (x2 + x3 - x0 - x1), 0.5 * (y2 + y3 - y0 - y1)
+    left_x, left_y = 0.5 * (x1 + x3 - x0 - x2), 0.5 * (y1 + y3 - y0 - y2)
+    rise_ahead, rise_left = 0.5 * (z2 + z3 - z0 - z1), 0.5 * (z1 + z3 - z0 - z2)
     # Slopes along x and y from the rises along both sides of the rectangle.
-    area = ahead[0] * left[1] - ahead[1] * left[0]
-    slope_x = float((rise[0] * left[1] - rise[1] * ahead[1]) / area)
-    slope_y = float((rise[1] * ahead[0] - rise[0] * left[0]) / area)
+    area = ahead_x * left_y - ahead_y * left_x
+    slope_x = (rise_ahead * left_y - rise_left * ahead_y) / area
+    slope_y = (rise_left * ahead_x - rise_ahead * left_x) / area
     steepness = slope_x * slope_x + slope_y * slope_y
     cosine = 1.0 / math.sqrt(1.0 + steepness)
     # The quaternion of the shortest turn of Z to the normal, (-slope_x, -slope_y, 1) * cosine.
     w = math.sqrt(0.5 * (1.0 + cosine))
     turn = (w, slope_y * cosine / (2.0 * w), -slope_x * cosine / (2.0 * w), 0.0)
-    middle = corners.mean(axis=0)
-    x, y = float(middle[0]), float(middle[1])
-    return SE3((x, y, float(z.mean())), turn) @ SE3((-x, -y, 0.0))
+    x, y = _mean(x0, x1, x2, x3), _mean(y0, y1, y2, y3)
+    return SE3((x, y, _mean(*z)), turn) @ SE3((-x, -y, 0.0))
 
 
-def _base(body: Body, foot: _Foot, z: Array, assets: AssetLibrary) -> Iterator[Body]:
+def _base(body: Body, foot: _Foot, z: Sequence[float], assets: AssetLibrary) -> Iterator[Body]:
     """Blocks below a building whose floor is above the lowest ground; none if nothing is open."""
     floor_m = _floor_m(foot.stance, z)
-    depth_m = math.ceil((floor_m - float(z.min()) + _SUNK_M) / _BASE_STEP_M) * _BASE_STEP_M
-    if floor_m - float(z.min()) < _SUNK_M:
+    depth_m = math.ceil((floor_m - min(z) + _SUNK_M) / _BASE_STEP_M) * _BASE_STEP_M
+    if floor_m - min(z) < _SUNK_M:
         return
     parts = [(foot.y_m, foot.x_m[1])]
     if foot.stance == "raised":
@@ -262,18 +274,27 @@ def _base(body: Body, foot: _Foot, z: Array, assets: AssetLibrary) -> Iterator[B
         width_m = round(left_m - right_m - _INSET_M / len(parts), 2)
         if min(length_m, width_m) <= 0.0:
             continue
-        asset = str(asset_ids.AssetId("box", {"size_m": (length_m, width_m, depth_m)}))
-        _, high = assets.bounds_m(asset)
+        asset = _box((length_m, width_m, depth_m))
         x_m = foot.x_m[0] + 0.5 * (_INSET_M + length_m)
         pose = SE3((0.0, 0.0, floor_m)) @ body.T_world_body
-        pose = pose @ SE3((x_m, 0.5 * (right_m + left_m), -high[2] - 0.001))
+        pose = pose @ SE3((x_m, 0.5 * (right_m + left_m), -_top_m(depth_m, assets) - 0.001))
         name = f"{body.name}/base{number or ''}"
         yield Body(name, asset, pose.rounded(), collides=False, materials=(_CONCRETE,))
 
 
-def _floor_m(stance: Stance, z: Array) -> float:
+def _box(size_m: Vec3) -> str:
+    return str(asset_ids.AssetId("box", {"size_m": size_m}))
+
+
+@lru_cache(maxsize=64)
+def _top_m(height_m: float, assets: AssetLibrary) -> float:
+    """Height of the upper side of boxes of one height; most bases have lengths of their own."""
+    return assets.bounds_m(_box((1.0, 1.0, height_m)))[1][2]
+
+
+def _floor_m(stance: Stance, z: Sequence[float]) -> float:
     """Height of the ground floor of a building, by the ground at its corners [4]."""
-    return float(max(z[2], z[3]) if stance == "raised" else 0.5 * (z[2] + z[3]))
+    return max(z[2], z[3]) if stance == "raised" else 0.5 * (z[2] + z[3])
 
 
 def _in_garden(foot: _Foot, body: Body, ways: Ways, assets: AssetLibrary) -> _Foot:
@@ -320,7 +341,7 @@ def _ridden(pose: SE3, yaw_rad: float, relief: Relief) -> SE3:
     half = (0.5 * _CAR_M[0], 0.5 * _CAR_M[1])
     foot = _Foot("tilted", (-half[0], half[0]), (-half[1], half[1]))
     corners = foot.corners([SE3.about_z(yaw_rad, (x, y, 0.0))])[0]
-    return _tilt(corners, relief.height(corners))
+    return _tilt(corners.tolist(), relief.height(corners).tolist())
 
 
 def _lifted_track(
@@ -331,7 +352,7 @@ def _lifted_track(
     heights = relief.height(corners.reshape(-1, 3)).reshape(-1, 4)
     knots = tuple(
         _move(foot.stance, points, z, sky_m) @ knot
-        for knot, points, z in zip(track.knots, corners, heights, strict=True)
+        for knot, points, z in zip(track.knots, corners.tolist(), heights.tolist(), strict=True)
     )
     return replace(track, knots=knots)
 
@@ -357,7 +378,7 @@ def _lifted_lanes(lanes: tuple[Lane, ...], relief: Relief) -> tuple[Lane, ...]:
     """
     if not lanes:
         return ()
-    lines = [_refined(np.asarray(lane.center_m, np.float64)) for lane in lanes]
+    lines = [_refined(np.array(lane.center_m, np.float64)) for lane in lanes]
     halves = [
         0.5 * _across_m(lane) * lane_geometry.left_normals(points)
         for lane, (points, _) in zip(lanes, lines, strict=True)
@@ -407,7 +428,7 @@ def _lifted_lane(
 
 def _refined(points: Array) -> tuple[Array, NDArray[np.bool_]]:
     """A line [n, 3] with further points, no two farther apart than a cell, and which were given."""
-    step = np.diff(points, axis=0)
+    step = points[1:] - points[:-1]
     count = np.maximum(np.ceil(np.hypot(step[:, 0], step[:, 1]) / CELL_M), 1.0).astype(np.int64)
     piece = np.repeat(np.arange(len(step)), count)
     number = 1 + np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)

@@ -195,6 +195,15 @@ def test_sections_differ_by_district() -> None:
 
 
 @pytest.mark.slow
+def test_land_beyond_the_ends_of_roads_is_grass_in_every_district() -> None:
+    """Gravel lay there in towns: on slopes, a broad beige band between road and horizon."""
+    for key, scene in districts().items():
+        (land,) = (body for body in scene.bodies if body.name == "land")
+        roles = [material.role for material in library().materials(land.asset)]
+        assert roles == ["grass"], key
+
+
+@pytest.mark.slow
 def test_towers_stand_where_one_sees_a_city() -> None:
     """Often at arterials, seldom in suburbs, never in villages; never on more than a third."""
     config = street()
