@@ -13,6 +13,7 @@ from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.sample import EgoTruth
 from gen_data.core.scene import Scene
+from tests.annotations.test_relations import instance_meshes
 from tests.embree import RayCaster
 
 SETTINGS = Grasps(tried=48, most=4)
@@ -20,18 +21,13 @@ SETTINGS = Grasps(tried=48, most=4)
 
 @cache
 def settled() -> tuple[Scene, EgoTruth, dict[int, trimesh.Trimesh]]:
-    """A table with objects: the scene, its grasps, and the meshes of all bodies by instance."""
+    """A table with objects: the scene, its grasps, and the meshes of instances."""
     small = ("sensors[0].size_px=[64, 48]", "exporters=[]", "annotations=[]")
     with open_pipeline(load_config("tabletop", overrides=small), frozenset()) as made:
         scene = made.sample(5).scene
         frame = annotate_ego({"": scene}, [SETTINGS], made.assets)
-        parts: dict[int, list[trimesh.Trimesh]] = {}
-        for body in scene.bodies:
-            mesh = made.assets.mesh(body.asset)
-            corners = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
-            parts.setdefault(body.instance_id, []).append(trimesh.Trimesh(corners, mesh.faces))
-    assert frame is not None
-    return scene, frame, {k: trimesh.util.concatenate(parts[k]) for k in parts}
+        assert frame is not None
+        return scene, frame, instance_meshes(scene, made.assets)
 
 
 def cast(mesh: trimesh.Trimesh, origin: Any, direction: Any) -> tuple[float, Any]:
@@ -64,7 +60,7 @@ def test_every_grasp_is_antipodal_and_its_score_is_the_friction_it_needs() -> No
 def test_open_grippers_touch_nothing() -> None:
     """Points sampled on all surfaces, tables and walls included, are outside fingers and palm."""
     _, frame, meshes = settled()
-    points = np.concatenate([m.sample(40_000, seed=1) for k, m in meshes.items() if k])
+    points = np.concatenate([m.sample(40_000, seed=1) for m in meshes.values()])
     thick_m, height_m, length_m = SETTINGS.finger_m
     for grasp in frame.grasps or ():
         x, y, z = grasp.T_world_grasp.inverse().apply(points).T

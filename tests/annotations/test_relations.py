@@ -18,9 +18,10 @@ from gen_data.annotations.surface_contacts import are_within, find_contacts, hit
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.capture import Channel
+from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.sample import ImageTruth, Relation
 from gen_data.core.scene import Scene
-from tests.embree import RayCaster
+from tests.embree import RayCaster, placed
 from tests.tiers import cases, slow
 from tests.wheels import INSTALLED
 
@@ -118,13 +119,16 @@ def settled(config: str, index: int, engine: str = INSTALLED[0]) -> Settled:
         image = annotate_reading(sample.scene, reading, annotators, Thresholds(), made.assets)
         frame = annotate_ego({"": sample.scene}, [Relations()], made.assets)
         assert frame is not None and frame.relations is not None
-        parts: dict[int, list[trimesh.Trimesh]] = {}
-        for body in sample.scene.bodies:
-            mesh = made.assets.mesh(body.asset)
-            corners = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
-            parts.setdefault(body.instance_id, []).append(trimesh.Trimesh(corners, mesh.faces))
-        meshes = {k: trimesh.util.concatenate(parts[k]) for k in parts if k}
+        meshes = instance_meshes(sample.scene, made.assets)
         return Settled(sample.scene, image, frame.relations, meshes)
+
+
+def instance_meshes(scene: Scene, assets: AssetLibrary) -> dict[int, trimesh.Trimesh]:
+    """Meshes in the world by instance."""
+    parts: dict[int, list[trimesh.Trimesh]] = {}
+    for body in scene.bodies:
+        parts.setdefault(body.instance_id, []).append(trimesh.Trimesh(*placed(body, assets)))
+    return {number: trimesh.util.concatenate(parts[number]) for number in parts if number}
 
 
 def distance_m(one: trimesh.Trimesh, other: trimesh.Trimesh) -> float:

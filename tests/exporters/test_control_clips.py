@@ -14,6 +14,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.exporters.control_clips import ControlClips, inverse_depth
 from tests.exporters.datasets import made_of
+from tests.exporters.label_readers import json_lines
 
 FIXED = ControlClips(near_m=5.0, far_m=60.0)
 
@@ -24,12 +25,9 @@ def image(path: Path) -> Any:
     return pixels if pixels.ndim == 2 else pixels[..., ::-1]
 
 
-def rows_of(split: Path) -> list[Any]:
-    return [json.loads(line) for line in (split / "metadata.jsonl").read_text().splitlines()]
-
-
 def problems(root: Path, samples: list[Any], camera: str = "color") -> Iterator[str]:
-    listed = [(split, row) for split in sorted(root.iterdir()) for row in rows_of(split)]
+    splits = sorted(root.iterdir())
+    listed = [(split, row) for split in splits for row in json_lines(split / "metadata.jsonl")]
     by_sample = {}
     for split, row in listed:
         clip = json.loads((split / row["clip"] / "clip.json").read_text())
@@ -87,9 +85,10 @@ def test_hugging_face_reads_images_and_text(
     from datasets import load_dataset
 
     train = load_dataset(str(dataset), split="train", cache_dir=str(tmp_path))
+    rows = json_lines(dataset / "train/metadata.jsonl")
     samples = [sample for sample in world.samples if sample.split == "train"]
     assert len(train) == len(samples)
-    for row, listed, sample in zip(train, rows_of(dataset / "train"), samples, strict=True):
+    for row, listed, sample in zip(train, rows, samples, strict=True):
         rgb = sample.capture.readings["color"].channels[Channel.RGB]
         np.testing.assert_array_equal(np.asarray(row["image"]), rgb)
         for kind in ("depth", "segmentation", "edges"):

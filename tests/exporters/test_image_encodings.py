@@ -15,7 +15,6 @@ from xml.etree import ElementTree
 
 import h5py
 import numpy as np
-import pyarrow.parquet
 import pytest
 from PIL import Image
 
@@ -34,7 +33,8 @@ from gen_data.exporters.voc import Voc
 from gen_data.runner.stored import ImageFiles
 from gen_data.sensors.camera.rgb_encoding import RgbEncoding
 from tests.exporters.drives import drive_info
-from tests.exporters.label_readers import json_lines, records
+from tests.exporters.label_readers import json_lines, parquet, records
+from tests.exporters.test_mcap import messages
 
 JPEG, WEBP = (ImageEncoding(kind, 92) for kind in ("jpeg", "webp"))
 LOSSLESS = ImageEncoding("webp_lossless")
@@ -135,20 +135,15 @@ def file_of(path: Path) -> Found:
 
 def in_parquet(folder: Path) -> Found:
     """As ``datasets`` embeds images."""
-    table = pyarrow.parquet.read_table(next((folder / "data").glob("train-*")))
-    image = table["image"][0].as_py()
+    image = parquet(next((folder / "data").glob("train-*")))["image"][0].as_py()
     return image["bytes"], Path(image["path"]).suffix
 
 
 def in_mcap(folder: Path) -> Found:
     """The first message of the camera, and Foxglove's name of its format."""
-    from mcap.reader import make_reader
-    from mcap_protobuf.decoder import DecoderFactory
-
-    with sorted(folder.glob("train/*.mcap"))[0].open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        _, _, _, message = next(reader.iter_decoded_messages(topics=["/camera/color/rgb"]))
-        return bytes(message.data), message.format
+    read = messages(sorted(folder.glob("train/*.mcap"))[0])
+    message = next(found for topic, _, _, found in read if topic == "/camera/color/rgb")
+    return bytes(message.data), message.format
 
 
 def in_solo(folder: Path) -> Found:

@@ -21,6 +21,7 @@ from gen_data.core.se3 import SE3
 from gen_data.exporters.culane import CULane
 from gen_data.exporters.openlane import OpenLane
 from tests.embree import RayCaster, placed
+from tests.exporters.datasets import made_of
 from tests.exporters.test_nuscenes_expansions import WIDTH_M, streets
 from tests.libraries import library
 
@@ -85,8 +86,13 @@ def openlane(world: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
     check_edges(folder)
     listed = (folder / "lane3d_1000/training.txt").read_text()
     assert listed == f"training/{NAME}.json\n"
-    row: dict[str, Any] = json.loads((folder / "lane3d_1000" / listed.strip()).read_text())
+    row = row_of(folder)
     assert (folder / "images" / row["file_path"]).exists()
+    return row
+
+
+def row_of(folder: Path) -> dict[str, Any]:
+    row: dict[str, Any] = json.loads((folder / f"lane3d_1000/training/{NAME}.json").read_text())
     return row
 
 
@@ -107,7 +113,7 @@ def own_road(row: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Any]]:
 
 def check_edges(folder: Path) -> None:
     """The edges of the road are where they are, and project to their pixels."""
-    row = json.loads((folder / f"lane3d_1000/training/{NAME}.json").read_text())
+    row = row_of(folder)
     K, edges = np.array(row["intrinsic"]), []
     for line, points in own_road(row):
         if line["category"] >= 20:
@@ -212,8 +218,7 @@ def test_a_camera_on_no_rig_has_its_vehicle_on_the_ground_below_it(
     camera = replace(truth.camera, rig="", T_rig_camera=SE3())
     loose = replace(one, truth={"front": replace(truth, camera=camera)},
                     scene=replace(one.scene, cameras=(camera,)))  # fmt: skip
-    folder = write(world, OpenLane(), tmp_path, loose)
-    row = json.loads((folder / f"lane3d_1000/training/{NAME}.json").read_text())
+    row = row_of(write(world, OpenLane(), tmp_path, loose))
     expected = np.eye(4)
     expected[2, 3] = EYE_M[2] - height_m(LANE_Y_M)
     np.testing.assert_allclose(row["extrinsic"], expected, atol=1e-3)
@@ -229,8 +234,7 @@ def test_lines_of_a_camera_do_not_depend_on_the_front_of_its_vehicle(
     T_rig_camera = SE3.about_z(yaw, (-0.8, 0.3, 0.0)) @ truth.camera.T_rig_camera
     camera = replace(truth.camera, T_rig_camera=T_rig_camera)
     turned = replace(one, truth={"front": replace(truth, camera=camera)})
-    folder = write(world, OpenLane(), tmp_path, turned)
-    row = json.loads((folder / f"lane3d_1000/training/{NAME}.json").read_text())
+    row = row_of(write(world, OpenLane(), tmp_path, turned))
     found, expected = leading_away(row), leading_away(openlane)
     assert {1, 2, 3} <= {line["attribute"] for line in found}
     for line, other in zip(found, expected, strict=True):
@@ -244,9 +248,7 @@ def leading_away(row: dict[str, Any]) -> list[dict[str, Any]]:
     return [line for line in row["lane_lines"] if np.ptp(line["xyz"][0]) > 0.1]
 
 
-@pytest.fixture(scope="module")
-def culane(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write(world, CULane(edges=True), tmp_path_factory.mktemp("culane"))
+culane = made_of(CULane(edges=True), road, library)
 
 
 def text_lines(folder: Path) -> list[Any]:

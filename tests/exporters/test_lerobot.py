@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow
 import pyarrow.parquet
 import pytest
 from PIL import Image
@@ -23,7 +22,7 @@ from gen_data.exporters.lerobot import LeRobot, task_sentence
 from gen_data.exporters.lerobot_statistics import image_sums
 from tests.exporters.datasets import with_sensor
 from tests.exporters.drives import drive_info
-from tests.exporters.label_readers import json_lines
+from tests.exporters.label_readers import json_lines, parquet
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +47,7 @@ def tasks_of(folder: Path) -> dict[int, str]:
     """Sentences by number; they are the index of the table that pandas reads."""
     path = folder / "meta/tasks.parquet"
     if path.exists():
-        table = pyarrow.parquet.read_table(path)
+        table = parquet(path)
         (index,) = json.loads(table.schema.metadata[b"pandas"])["index_columns"]
         return dict(zip(table["task_index"].to_pylist(), table[index].to_pylist(), strict=True))
     return {row["task_index"]: row["task"] for row in json_lines(folder / "meta/tasks.jsonl")}
@@ -60,7 +59,7 @@ def episodes_of(folder: Path) -> list[dict[str, Any]]:
         stats = json_lines(folder / "meta/episodes_stats.jsonl")
         pairs = zip(json_lines(folder / "meta/episodes.jsonl"), stats, strict=True)
         return [episode | line for episode, line in pairs]
-    rows = pyarrow.parquet.read_table(path).to_pylist()
+    rows = parquet(path).to_pylist()
     for row in rows:
         row["stats"] = {}
         for name in [name for name in row if name.startswith("stats/")]:
@@ -70,11 +69,8 @@ def episodes_of(folder: Path) -> list[dict[str, Any]]:
 
 
 def rows_of(folder: Path) -> list[dict[str, Any]]:
-    rows = []
-    for path in sorted((folder / "data").rglob("*.parquet")):
-        with pyarrow.parquet.ParquetFile(path) as file:
-            rows += file.read().to_pylist()
-    return rows
+    paths = sorted((folder / "data").rglob("*.parquet"))
+    return [row for path in paths for row in parquet(path).to_pylist()]
 
 
 def faults(folder: Path, samples: Any) -> list[str]:

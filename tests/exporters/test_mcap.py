@@ -33,6 +33,11 @@ def messages(path: Path) -> list[tuple[str, str, int, Any]]:
         return [(c.topic, s.name, m.log_time, message) for s, c, m, message in decoded]
 
 
+def summary_of(path: Path) -> Any:
+    with path.open("rb") as file:
+        return make_reader(file).get_summary()
+
+
 def pose(translation: Any, rotation: Any) -> SE3:
     xyz = (translation.x, translation.y, translation.z)
     return SE3(xyz, (rotation.w, rotation.x, rotation.y, rotation.z))
@@ -152,11 +157,7 @@ def test_messages_agree_with_the_samples_in_foxgloves_schemas(dataset: Path, sam
     names = ("FrameTransform", "CompressedImage", "CameraCalibration", "ImageAnnotations",
              "PointCloud", "SceneUpdate")  # fmt: skip
     assert {name for _, name, _, _ in found} == {f"foxglove.{name}" for name in names}
-    with path.open("rb") as file:
-        summary = make_reader(file).get_summary()
-    assert summary is not None
-    assert summary.statistics is not None
-    assert summary.statistics.message_count == len(found)
+    assert summary_of(path).statistics.message_count == len(found)
 
 
 def test_compressed_files_hold_the_same(dataset: Path, exported: Any) -> None:
@@ -164,10 +165,7 @@ def test_compressed_files_hold_the_same(dataset: Path, exported: Any) -> None:
     path = Path("train/street-000000.mcap")
     plain, compressed = dataset / path, exported(Mcap(compression="zstd")) / path
     assert compressed.stat().st_size < plain.stat().st_size
-    with compressed.open("rb") as file:
-        summary = make_reader(file).get_summary()
-    assert summary is not None
-    assert {chunk.compression for chunk in summary.chunk_indexes} == {"zstd"}
+    assert {chunk.compression for chunk in summary_of(compressed).chunk_indexes} == {"zstd"}
     assert str(messages(compressed)) == str(messages(plain))
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from gen_data.core.capture import Capture, PointCloud
 from gen_data.core.scene_time import scene_at
@@ -15,6 +16,7 @@ from gen_data.exporters.mcap import Mcap
 from gen_data.exporters.pointclouds import PointClouds
 from tests.exporters.conftest import driving_scene, ego_pose, scan
 from tests.exporters.drives import drive_info, read_ply
+from tests.exporters.test_mcap import messages
 
 SWEEP_S, STAMP_S = 0.1, 0.2
 MOUNT = SE3((0.0, 0.0, 1.73))
@@ -70,15 +72,10 @@ def test_static_points_of_ply_files_lie_in_boxes(sample: Any, world: Any, tmp_pa
 
 def test_static_points_of_mcap_files_lie_in_cubes(sample: Any, world: Any, tmp_path: Path) -> None:
     """The stamp of the message plus ``time_s``; metadata state the base."""
-    pytest.importorskip("mcap_protobuf")
-    from mcap.reader import make_reader
-    from mcap_protobuf.decoder import DecoderFactory
-
-    folder = world.export(Mcap(), drive_info(world), [sample], tmp_path)
-    with next(folder.rglob("*.mcap")).open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        (facts,) = [m.metadata for m in reader.iter_metadata() if m.name == "gen-data"]
-        found = {c.topic: m for _, c, _, m in reader.iter_decoded_messages()}
+    (path,) = world.export(Mcap(), drive_info(world), [sample], tmp_path).rglob("*.mcap")
+    found = {topic: message for topic, _, _, message in messages(path)}
+    with path.open("rb") as file:
+        (facts,) = [m.metadata for m in make_reader(file).iter_metadata() if m.name == "gen-data"]
     cloud = found["/lidar/top/points"]
     # Sequences begin at 1 January 2020, 1,577,836,800 s.
     stamp_s = cloud.timestamp.seconds - 1_577_836_800 + cloud.timestamp.nanos * 1e-9

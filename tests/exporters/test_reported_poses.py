@@ -23,6 +23,7 @@ from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
 from tests.exporters.drives import drive_info
 from tests.exporters.test_exporter_contract import files, given
+from tests.exporters.test_mcap import messages
 from tests.tiers import sampled
 
 HALF_RAD = math.radians(1.0)
@@ -188,9 +189,8 @@ def test_formats_of_rectified_images_refuse_wrong_calibrations_of_pairs(
 
 def test_transforms_of_mcap_lead_to_the_stated_poses(world: Any, tmp_path: Path) -> None:
     """From rigs to sensors; rigs are where they are, and all other messages are the same."""
-    reader = pytest.importorskip("tests.exporters.test_mcap")
     clean, wrong, there = (
-        [m for path in sorted(folder.rglob("*.mcap")) for m in reader.messages(path)]
+        [m for path in sorted(folder.rglob("*.mcap")) for m in messages(path)]
         for folder in exports("mcap", world, tmp_path)
     )
     assert len(wrong) == len(there) == len(clean)

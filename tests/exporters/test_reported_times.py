@@ -1,8 +1,6 @@
 """Formats state the times that wrong clocks report; labels are of the true instants."""
 
-import csv
 import json
-import tarfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -12,13 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pyarrow import feather
 
 from gen_data.core.capture import Capture
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
 from tests.exporters.drives import drive_info
+from tests.exporters.label_readers import csv_rows, parquet, tar_samples
 from tests.exporters.test_exporter_contract import files, given
+from tests.exporters.test_mcap import messages
 from tests.tiers import sampled
 
 LATE_S = 0.1
@@ -95,39 +96,28 @@ def tum(folder: Path) -> list[float]:
 
 
 def mcap(folder: Path) -> list[float]:
-    reader = pytest.importorskip("tests.exporters.test_mcap")
-    read = [m for path in found(folder, "*.mcap") for m in reader.messages(path)]
+    read = [m for path in found(folder, "*.mcap") for m in messages(path)]
     of_sensors = [m for t, _, _, m in read if t.startswith(("/camera", "/lidar"))]
     stamps = [m.timestamp for m in of_sensors if "timestamp" in m.DESCRIPTOR.fields_by_name]
     return sorted(stamp.seconds + 1e-9 * stamp.nanos for stamp in stamps)
 
 
 def webdataset(folder: Path) -> list[float]:
-    times: list[float] = []
-    for path in found(folder, "*.tar"):
-        with tarfile.open(path) as tar:
-            members = [m for m in tar.getmembers() if m.name.endswith(".json")]
-            for labels in (json.load(tar.extractfile(m)) for m in members):  # type: ignore[arg-type]
-                times += values([labels["cameras"], labels["lidars"]], "time_s")
-    return times
+    read = (labels["json"] for split in folder.iterdir() for labels in tar_samples(split))
+    return [t for labels in read for t in values([labels["cameras"], labels["lidars"]], "time_s")]
 
 
 def tables(folder: Path) -> list[float]:
-    times = json_times("poses.jsonl")(folder)
-    for path in found(folder, "*.csv"):
-        with path.open(newline="") as file:
-            times += [float(row["time_s"]) for row in csv.DictReader(file)]
-    return times
+    rows = (row for path in found(folder, "*.csv") for row in csv_rows(path))
+    return [*json_times("poses.jsonl")(folder), *(float(row["time_s"]) for row in rows)]
 
 
 def huggingface(folder: Path) -> list[float]:
-    parquet = pytest.importorskip("pyarrow.parquet")
-    read = (parquet.read_table(path)["time_s"] for path in found(folder, "*.parquet"))
-    return [t for column in read for t in column.to_pylist()]
+    paths = found(folder, "*.parquet")
+    return [t for path in paths for t in parquet(path)["time_s"].to_pylist()]
 
 
 def argoverse2(folder: Path) -> list[float]:
-    feather = pytest.importorskip("pyarrow.feather")
     stamps = names("sensors/**/*.*", 1e-9)(folder)
     for table in ("annotations", "city_SE3_egovehicle"):
         for path in found(folder, f"{table}.feather"):
@@ -256,12 +246,10 @@ def test_labels_of_nuscenes_are_true_and_its_ego_is_where_it_was_at_the_stamp(
 def test_boxes_of_argoverse_fit_the_points_and_the_city_has_the_true_trajectory(
     world: Any, tmp_path: Path
 ) -> None:
-    feather = pytest.importorskip("pyarrow.feather")
     clean, wrong = exports("argoverse2", world, tmp_path)
 
     def rows(folder: Path, table: str) -> list[dict[str, Any]]:
-        path = found(folder, f"{table}.feather")[0]
-        return list(feather.read_table(path).to_pylist())
+        return list(feather.read_table(found(folder, f"{table}.feather")[0]).to_pylist())
 
     def without_times(listed: list[dict[str, Any]]) -> list[dict[str, Any]]:
         return [{k: v for k, v in row.items() if k != "timestamp_ns"} for row in listed]
@@ -277,9 +265,8 @@ def test_boxes_of_argoverse_fit_the_points_and_the_city_has_the_true_trajectory(
 
 
 def test_transforms_of_mcap_are_true_at_the_reported_times(world: Any, tmp_path: Path) -> None:
-    reader = pytest.importorskip("tests.exporters.test_mcap")
     _, wrong = exports("mcap", world, tmp_path)
-    read = reader.messages(found(wrong, "*.mcap")[0])
+    read = messages(found(wrong, "*.mcap")[0])
     begin_ns = min(log_ns for topic, _, log_ns, _ in read if topic == "/objects")
     transforms = [(log_ns, m) for topic, _, log_ns, m in read if topic == "/tf"]
     rigs = {ns: m for ns, m in transforms if m.child_frame_id == "rig/ego"}

@@ -1,6 +1,5 @@
 """Rows of devices as files that spreadsheets and NumPy read."""
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from gen_data.core.interfaces import Modality, SensorInfo, table_path
 from gen_data.exporters.image_files import write_media
 from gen_data.exporters.measurement_tables import Tables, read_rows
 from gen_data.sensors.navigation.imu import Imu
+from tests.exporters.label_readers import csv_rows, json_lines
 
 IMU = SensorInfo("imu", Modality.DEVICE, "imu", columns=Imu.columns)
 
@@ -20,8 +20,7 @@ IMU = SensorInfo("imu", Modality.DEVICE, "imu", columns=Imu.columns)
 def test_csv_holds_every_digit_that_counts_by_sequence(world: Any, tmp_path: Path) -> None:
     """All that was measured is read back, row by row, with the index of its sample."""
     folder = world.export(Tables(), world.info(7, steps_per_scene=2), world.samples, tmp_path)
-    with (folder / "imu/000001.csv").open(encoding="ascii", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(folder / "imu/000001.csv")
     assert [int(row["sample"]) for row in rows] == [2, 2, 2, 3, 3, 3]
     assert [float(row["force_x_m_s2"]) for row in rows[:3]] == [0.0, 1.0 / 3.0, -2.5e-7]
     assert rows[0]["time_s"] == "0.2"
@@ -47,7 +46,7 @@ def test_columns_and_poses_are_told(world: Any, tmp_path: Path) -> None:
     """The meaning of each column, and the place of the device."""
     folder = world.export(Tables(), world.info(7), world.samples, tmp_path)
     columns = json.loads((folder / "columns.json").read_text())["imu"]
-    poses = [json.loads(line) for line in (folder / "imu/poses.jsonl").read_text().splitlines()]
+    poses = json_lines(folder / "imu/poses.jsonl")
     assert columns["kind"] == "imu"
     assert all(column["meaning"] for column in columns["columns"])
     assert [pose["index"] for pose in poses] == list(range(7))

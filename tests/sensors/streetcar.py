@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.core import asset_types, motion, scene_time, streams
+from gen_data.core import motion, scene_time, streams
 from gen_data.core.capture import Channel, LidarHits, LidarRays, Measurements, SensorReading
 from gen_data.core.scene import Body, Camera, Instance, Lane, Lidar, Rig, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.sensors.mounting import Instrument
+from tests.sensors.scanned import echoes
 
 CAR_M = ((-2.2, -0.9, 0.0), (2.2, 0.9, 1.5))
 PERSON_M = ((-0.25, -0.3, 0.0), (0.25, 0.3, 1.8))
@@ -106,7 +107,6 @@ class BoxRays:
     """A renderer whose world are the boxes of instances; reflectance 0.5 everywhere."""
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
-        shape = (len(beams.directions), beams.subrays)
         best = np.full(len(beams.directions), np.inf)
         ids, categories = np.zeros(len(best), int), np.zeros(len(best), int)
         present = {body.instance_id for body in scene.bodies}
@@ -122,19 +122,8 @@ class BoxRays:
             best[hit], ids[hit] = enter[hit], thing_.instance_id
             categories[hit] = thing_.category_id
         best[best > beams.range_max_m] = np.inf
-        found = np.isfinite(best)
-
-        def wide(values: np.ndarray, kind: type) -> np.ndarray:
-            return np.broadcast_to(values[:, None], shape).astype(kind)
-
-        return LidarHits(
-            wide(best, np.float32),
-            wide(np.where(found, 0.5, 0.0), np.float32),
-            wide(found, np.float32),
-            wide(ids, np.uint16),
-            wide(categories, np.uint16),
-            np.full(shape, asset_types.SURFACES.index(""), np.uint8),
-        )
+        ranges_m = np.repeat(best[:, None], beams.subrays, axis=1)
+        return echoes(ranges_m, ids=ids[:, None], categories=categories[:, None])
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         raise AssertionError("this device does not look at pictures")

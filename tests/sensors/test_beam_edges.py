@@ -1,18 +1,14 @@
 """Beams of several rays at the edges of a scene, and of one ray elsewhere."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from gen_data.core.asset_types import SURFACES
-from gen_data.core.capture import PATHS, LidarHits, LidarRays, SecondaryHits
-from gen_data.core.scene import Camera, Lidar, Scene
-from gen_data.core.streams import Streams
-from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.core.capture import LidarHits, LidarRays
+from gen_data.core.scene import Lidar, Scene
 from gen_data.sensors.lidar import beam_edges
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from gen_data.sensors.lidar.scan_pattern import make_sweep
+from tests.sensors.scanned import capture, echoes, paths_of, with_mirrors
 
 HALF_POST_RAD = np.radians(1.0)
 POST_ID, GROUND_ID = 7, 3
@@ -48,20 +44,8 @@ class Post:
         to_post = np.where(
             np.abs(np.arctan2(d[..., 1], d[..., 0])) < HALF_POST_RAD, 10.0 / level, np.inf
         )
-        first = np.minimum(to_ground, to_post)
-        ids = np.where(to_post < to_ground, POST_ID, GROUND_ID) * np.isfinite(first)
-        bright = np.where(np.isfinite(first), np.float32(0.5), np.float32(0.0))
-        return LidarHits(first.astype(np.float32), bright, bright, ids.astype(np.uint16),
-                         ids.astype(np.uint16), np.zeros(first.shape, np.uint8))  # fmt: skip
-
-    def render(self, scene: Scene, camera: Camera, channels: object) -> None:
-        raise AssertionError("a laser scanner takes no picture")
-
-
-def points_of(sensor: LidarSensor, renderer: Post) -> np.ndarray:
-    scene = sensor.mount(RgbCamera(name="color").mount(Scene("t")))
-    rng = Streams(seed=0, scene=0).rng("sensor/lidar")
-    return sensor.capture(scene, renderer, frozenset(), rng).points  # type: ignore[arg-type]
+        ids = np.where(to_post < to_ground, POST_ID, GROUND_ID)
+        return echoes(np.minimum(to_ground, to_post), ids=ids, categories=ids)
 
 
 @pytest.mark.parametrize("beams", [(), STAGGERED])
@@ -96,7 +80,7 @@ def test_beams_of_seven_rays_at_edges_find_the_points_of_seven_rays_everywhere(m
     for divergence in (True, "edges", False):
         sensor = LidarSensor(model=model, ideal=True, divergence=divergence)
         renderer = Post()
-        points[divergence] = points_of(sensor, renderer)
+        points[divergence] = capture(sensor, renderer).points
         traced[divergence] = renderer.traced
     on_post = {d: int((p["instance_id"] == POST_ID).sum()) for d, p in points.items()}
 
@@ -120,29 +104,10 @@ class Rooms(Post):
         # Of all beams the ones in the middle of the post, where there is no edge.
         aside = np.abs(np.arctan2(beams.directions[post, 1], beams.directions[post, 0]))
         post = np.sort(post[np.argsort(aside, kind="stable")[:4]])
-        surface = np.array([SURFACES.index("mirrored")] * 3 + [0], np.uint8)
-        ids, shown = np.array([0, 0, 0, 9], np.uint16), np.array([5, 5, 5, 0], np.uint16)
-        far_m, place_m = np.full(4, 50.0, np.float32), np.full((4, 3), (1, 2, 3), np.float32)
-        detours = SecondaryHits(
-            post * beams.subrays, far_m, np.full(4, 300.0, np.float32), ids, ids, surface
-        )
-        if beams.mirrored:
-            detours = replace(detours, mirrored_id=shown, mirrored_m=place_m)
-        return replace(hits, detours=detours)
+        return with_mirrors(hits, beams, post, 300.0)
 
 
 def test_origins_belong_to_the_rays_of_both_kinds_of_beams() -> None:
     sensor = LidarSensor(model="VLP-16", divergence="edges", origins=True, returns="dual")
-    scene = sensor.mount(RgbCamera(name="color").mount(Scene("t")))
-    rng = Streams(seed=0, scene=0).rng("sensor/lidar")
-    cloud = sensor.capture(scene, Rooms(), frozenset(), rng)  # type: ignore[arg-type]
-    points, origins = cloud.points, cloud.origins
-    assert origins is not None
-
-    path = np.array(PATHS)[origins["path"]]
-    mirrored = points["surface"] == SURFACES.index("mirrored")
-    assert mirrored.sum() > 3 and (points["instance_id"] == 9).any()
-    assert ((path == "mirror") == mirrored).all()
-    assert ((path == "glass") == (points["instance_id"] == 9)).all()
-    expected = np.where(mirrored, 5, points["instance_id"])
-    np.testing.assert_array_equal(origins["true_instance_id"], expected)
+    path = paths_of(capture(sensor, Rooms()))
+    assert (path == "mirror").sum() > 3 and (path == "glass").any()

@@ -154,20 +154,6 @@ def test_a_principal_point_is_shifted_scaled_and_cropped(
     assert (found.fx_px, found.fy_px) == (500 * scale, 510 * scale)
 
 
-@pytest.mark.parametrize(("text", "fact"), [
-    ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 320, cy_px: 240}",
-     "intrinsics: excludes hfov_deg"),
-    ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1}", "missing key 'cy_px'"),
-    ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 320, cy_px: 240}", "0 is not"),
-    ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1, cy_px: 1, size_px: [640, 400]}",
-     "is taller than the calibrated 640 x 400"),
-    ("hfov_deg: 60, lens: {model: calibrated, camera: euroc_cam0}", "leave out hfov_deg"),
-    ("lens: {model: calibrated, camera: euroc}", "expected one of euroc_cam0"),
-])  # fmt: skip
-def test_contradictions_are_refused(tmp_path: Path, text: str, fact: str) -> None:
-    assert fact in told(tmp_path, text)
-
-
 # --- files ---
 
 
@@ -203,14 +189,26 @@ def test_coefficients_without_a_lens_are_refused(tmp_path: Path, D: Array, fact:
     assert message.startswith(f"camera.yaml:{fact}")
 
 
-@pytest.mark.parametrize(
-    ("model", "D", "fisheye"),
-    [("plumb_bob", D5, False), ("rational_polynomial", D8, False), ("equidistant", D4, True)],
-)
-def test_a_camera_info_of_ros_projects(tmp_path: Path, model: str, D: Array, fisheye: bool) -> None:
-    content = ROS % (model, len(D), D.tolist())
-    found = sensor(tmp_path, LENS, content=content).nominal_intrinsics()
-    assert_projects(found, project_cv(D, fisheye=fisheye))
+@pytest.mark.parametrize(("name", "content", "D", "fisheye"), [
+    ("camera.yaml", ROS % ("plumb_bob", 5, D5.tolist()), D5, False),
+    ("camera.yaml", ROS % ("rational_polynomial", 8, D8.tolist()), D8, False),
+    ("camera.yaml", ROS % ("equidistant", 4, D4.tolist()), D4, True),
+    ("camera.yaml", KALIBR.partition("cam1:")[0], D5[:4], False),
+    # COLMAP's pixel centres are at halves: its principal point is OpenCV's plus a half.
+    *(("cameras.txt", f"# cameras\n1 {model} 640 512 812.4 811.9 319.2 259.8 {words}\n", D, fisheye)
+      for model, words, D, fisheye in (
+        ("PINHOLE", "", np.zeros(4), False),
+        ("OPENCV", "-0.21 0.09 0.0007 -0.0004", D5[:4], False),
+        ("FULL_OPENCV", " ".join(map(str, D8)), D8, False),
+        ("OPENCV_FISHEYE", " ".join(map(str, D4)), D4, True),
+    )),
+])  # fmt: skip
+def test_files_of_ros_kalibr_and_colmap_project_as_opencv_does(
+    tmp_path: Path, name: str, content: str, D: Array, fisheye: bool
+) -> None:
+    found = sensor(tmp_path, LENS, name, content=content)
+    assert found.size_px == (640, 512)
+    assert_projects(found.nominal_intrinsics(), project_cv(D, fisheye=fisheye))
 
 
 def test_a_printed_message_of_ros_is_read_and_its_header_is_named(tmp_path: Path) -> None:
@@ -269,21 +267,6 @@ def test_a_message_of_ros_with_an_empty_region_and_no_binning_is_of_all_pixels(
     assert_projects(found.nominal_intrinsics(), project_cv(D5))
 
 
-@pytest.mark.parametrize(("content", "fact"), [
-    ("K: [812.4, 0, 0, 0, 811.9, 0, 318.7, 259.3, 1]",
-     "camera.yaml:1:4: camera matrix: its third row is 318.7 259.3 1, expected 0 0 1; transpose"),
-    ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 2]", "its third row is 0 0 2, expected 0 0 1"),
-    ("K: [812.4, 0, 318.7, 1.5, 811.9, 259.3, 0, 0, 1]", "skew 1.5 has no place in a camera here"),
-    ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\nxi: 1.2\nD: [0.1, 0.2, 0, 0]",
-     "camera.yaml:2:5: xi: omnidirectional lenses have no lens here"),
-    (ROS % ("none", 5, D5.tolist()), "are not 0, but the lens is 'none'"),
-    (KALIBR.replace("radtan", "none").partition("cam1:")[0], "are not 0, but the lens is 'none'"),
-    (MESSAGE.replace("---", "binning_x: 1.5"), "binning_x: expected a whole number"),
-])  # fmt: skip
-def test_numbers_that_no_lens_here_has_are_refused(tmp_path: Path, content: str, fact: str) -> None:
-    assert fact in told(tmp_path, LENS, content=content)
-
-
 @pytest.mark.parametrize(("size", "fact"), [
     ("", "lens.file: camera.yaml does not state the size of its images; give size_px"),
     ("size_px: [320, 240], ", "the principal point (318.7, 259.3) is far from the middle of 320 x "
@@ -327,30 +310,6 @@ def test_cameras_of_a_kalibr_chain_project_as_opencv_does(tmp_path: Path) -> Non
     assert other.size_px == (512, 512)
 
 
-@pytest.mark.parametrize(("old", "new", "fact"), [
-    ("pinhole", "ds", "'ds' has no lens here; expected pinhole, or omni with xi 0"),
-    ("radtan", "fov", "'fov' has no lens here; expected radtan, equidistant or none"),
-    ("[812.4, 811.9, 318.7, 259.3]", "[812.4, 811.9]", "expected 4 numbers, got 2"),
-    ("[812.4, 811.9, 318.7, 259.3]", "[812.4, one, 1, 2]", "expected a number, got 'one'"),
-])  # fmt: skip
-def test_another_model_in_kalibr_is_refused(tmp_path: Path, old: str, new: str, fact: str) -> None:
-    text = told(tmp_path, LENS.replace("}", ", camera: cam0}"), content=KALIBR.replace(old, new, 1))
-    assert text.startswith("camera.yaml:")
-    assert fact in text
-
-
-@pytest.mark.parametrize(("line", "D", "fisheye"), [
-    ("1 PINHOLE 640 512 812.4 811.9 319.2 259.8", np.zeros(4), False),
-    ("1 OPENCV 640 512 812.4 811.9 319.2 259.8 -0.21 0.09 0.0007 -0.0004", D5[:4], False),
-    ("1 FULL_OPENCV 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D8)), D8, False),
-    ("1 OPENCV_FISHEYE 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D4)), D4, True),
-])  # fmt: skip
-def test_a_camera_of_colmap_projects(tmp_path: Path, line: str, D: Array, fisheye: bool) -> None:
-    """COLMAP's pixel centres are at halves: its principal point is OpenCV's plus a half."""
-    found = sensor(tmp_path, LENS, "cameras.txt", content=f"# cameras\n{line}\n")
-    assert_projects(found.nominal_intrinsics(), project_cv(D, fisheye=fisheye))
-
-
 @pytest.mark.parametrize(("line", "expected"), [
     ("1 SIMPLE_PINHOLE 640 512 800 320 256", (800.0, 800.0, ())),
     ("1 SIMPLE_RADIAL 640 512 800 320 256 -0.1", (800.0, 800.0, (-0.1, 0, 0, 0, 0, 0, 0, 0))),
@@ -361,11 +320,6 @@ def test_simple_models_of_colmap(tmp_path: Path, line: str, expected: Any) -> No
     found = sensor(tmp_path, LENS, "cameras.txt", content=line).nominal_intrinsics()
     assert (found.fx_px, found.fy_px, found.lens.coefficients) == expected
     assert (found.cx_px, found.cy_px) == (320.0, 256.0)
-
-
-def test_a_model_of_colmap_without_a_lens_is_refused(tmp_path: Path) -> None:
-    text = told(tmp_path, LENS, "cameras.txt", content="1 FOV 640 512 800 800 320 256 0.9\n")
-    assert text.startswith("cameras.txt:1:1: MODEL: 'FOV' has no lens here; expected one of")
 
 
 def test_a_calibration_is_scaled_to_the_size_of_the_image(tmp_path: Path) -> None:
@@ -396,25 +350,6 @@ def test_a_calibration_replaces_an_inherited_field_of_view(tmp_path: Path) -> No
     )  # fmt: skip
     found = load_config(str(tmp_path / "mine.yaml")).sensors[0].nominal_intrinsics()  # type: ignore[attr-defined]
     assert found.fx_px == 812.4
-
-
-@pytest.mark.parametrize(("text", "content", "fact"), [
-    (LENS, "", "there is no file 'camera.yaml'"),
-    (LENS, "a: 1\n", "camera.yaml:1:1: no camera found; expected a camera matrix"),
-    (LENS + ", hfov_deg: 60", "a: 1", "hfov_deg: the file that lens names gives it: leave it out"),
-    (LENS, ROS % ("thin", 5, D5.tolist()), "'thin' is not a known lens; expected one of plumb_bob"),
-    (LENS, ROS % ("plumb_bob", 5, D5.tolist()) + "k: [\n", "not valid YAML"),
-    (LENS, (ROS % ("plumb_bob", 5, D5.tolist())).replace("812.4, 0,", "812.4, 2,"), "skew 2"),
-    (LENS, KALIBR, "has several cameras, or none: name one; expected one of cam0, cam1"),
-    (LENS.replace("}", ", camera: cam2}"), KALIBR,
-     "has no camera 'cam2'; expected one of cam0, cam1"),
-    ("offset_m: [0, 0, 1], mounting: {file: FILE, frame: cam1}", KALIBR,
-     "offset_m: the file that mounting names gives it"),
-    (LENS.replace("file", "fil"), "a: 1\n", "unknown key 'fil'"),
-    (LENS.replace("}", ", fishy: 1}"), "a: 1\n", "unknown key 'fishy'"),
-])  # fmt: skip
-def test_a_bad_file_is_refused(tmp_path: Path, text: str, content: str, fact: str) -> None:
-    assert fact in told(tmp_path, text, content=content)
 
 
 # --- places on a rig ---
@@ -707,7 +642,43 @@ def test_a_camera_on_a_hand_is_where_the_links_of_its_robot_have_it(tmp_path: Pa
     assert "mounting.relative_axes: the rig 'arm_wrist' has X out of the hand; state" in message
 
 
-@pytest.mark.parametrize(("text", "name", "content", "fact"), [
+INTRINSICS = "intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1"
+COEFFICIENTS = ROS % ("plumb_bob", 5, D5.tolist())
+FIRST, _, _ = KALIBR.partition("cam1:")
+UNDISTORTED = "are not 0, but the lens is 'none'"
+CONTRADICTIONS = [
+    ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 320, cy_px: 240}",
+     "intrinsics: excludes hfov_deg"),
+    (INTRINSICS + "}", "missing key 'cy_px'"),
+    ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 320, cy_px: 240}", "0 is not"),
+    (INTRINSICS + ", cy_px: 1, size_px: [640, 400]}", "is taller than the calibrated 640 x 400"),
+    ("hfov_deg: 60, lens: {model: calibrated, camera: euroc_cam0}", "leave out hfov_deg"),
+    ("lens: {model: calibrated, camera: euroc}", "expected one of euroc_cam0"),
+    (LENS, "there is no file 'camera.yaml'"),
+]  # fmt: skip
+LENSES = [
+    ("K: [812.4, 0, 0, 0, 811.9, 0, 318.7, 259.3, 1]",
+     "camera.yaml:1:4: camera matrix: its third row is 318.7 259.3 1, expected 0 0 1; transpose"),
+    ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 2]", "its third row is 0 0 2, expected 0 0 1"),
+    ("K: [812.4, 0, 318.7, 1.5, 811.9, 259.3, 0, 0, 1]", "skew 1.5 has no place in a camera here"),
+    ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\nxi: 1.2\nD: [0.1, 0.2, 0, 0]",
+     "camera.yaml:2:5: xi: omnidirectional lenses have no lens here"),
+    (ROS % ("none", 5, D5.tolist()), UNDISTORTED),
+    (MESSAGE.replace("---", "binning_x: 1.5"), "binning_x: expected a whole number"),
+    (FIRST.replace("radtan", "none"), UNDISTORTED),
+    (FIRST.replace("pinhole", "ds"),
+     "camera.yaml:2:17: camera_model: 'ds' has no lens here; expected pinhole, or omni with xi 0"),
+    (FIRST.replace("radtan", "fov"),
+     "yaml:4:21: distortion_model: 'fov' has no lens here; expected radtan, equidistant or none"),
+    (FIRST.replace(", 318.7, 259.3", ""), "yaml:3:15: intrinsics: expected 4 numbers, got 2"),
+    (FIRST.replace("811.9", "one"), "camera.yaml:3:23: intrinsics: expected a number, got 'one'"),
+    ("a: 1\n", "camera.yaml:1:1: no camera found; expected a camera matrix"),
+    (ROS % ("thin", 5, D5.tolist()), "'thin' is not a known lens; expected one of plumb_bob"),
+    (COEFFICIENTS + "k: [\n", "not valid YAML"),
+    (COEFFICIENTS.replace("812.4, 0,", "812.4, 2,"), "skew 2"),
+    (KALIBR, "has several cameras, or none: name one; expected one of cam0, cam1"),
+]  # fmt: skip
+PLACES = [
     ("frame: cam9", "chain.yaml", KALIBR, "has no frame 'cam9'; expected one of cam0, cam1"),
     ("frame: cam1, relative_to: imu", "chain.yaml", KALIBR, "has no frame 'imu'"),
     ("frame: cam1, axes: sideways", "chain.yaml", KALIBR, "expected one of optical, body"),
@@ -717,9 +688,26 @@ def test_a_camera_on_a_hand_is_where_the_links_of_its_robot_have_it(tmp_path: Pa
     ("frame: a", "tf.yaml", TF.replace("w: 0.8", "w: 1.8"), "is not a unit quaternion"),
     ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="'), "expected three numbers"),
     ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>"),
-])  # fmt: skip
-def test_bad_places_are_refused(
+]  # fmt: skip
+FAULTS = [
+    *((text, "camera.yaml", "", fact) for text, fact in CONTRADICTIONS),
+    *((LENS, "camera.yaml", content, fact) for content, fact in LENSES),
+    *((f"rig: r, mounting: {{file: FILE, {text}}}", *rest) for text, *rest in PLACES),
+    (LENS, "cameras.txt", "1 FOV 640 512 800 800 320 256 0.9\n",
+     "cameras.txt:1:1: MODEL: 'FOV' has no lens here; expected one of"),
+    (LENS + ", hfov_deg: 60", "camera.yaml", "a: 1",
+     "hfov_deg: the file that lens names gives it: leave it out"),
+    (LENS.replace("}", ", camera: cam2}"), "camera.yaml", KALIBR,
+     "has no camera 'cam2'; expected one of cam0, cam1"),
+    ("offset_m: [0, 0, 1], mounting: {file: FILE, frame: cam1}", "camera.yaml", KALIBR,
+     "offset_m: the file that mounting names gives it"),
+    (LENS.replace("file", "fil"), "camera.yaml", "a: 1\n", "unknown key 'fil'"),
+    (LENS.replace("}", ", fishy: 1}"), "camera.yaml", "a: 1\n", "unknown key 'fishy'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "name", "content", "fact"), FAULTS)
+def test_files_and_settings_that_no_camera_here_has_are_refused(
     tmp_path: Path, text: str, name: str, content: str, fact: str
 ) -> None:
-    message = told(tmp_path, f"rig: r, mounting: {{file: FILE, {text}}}", name, content=content)
-    assert fact in message
+    assert fact in told(tmp_path, text, name, content=content)

@@ -1,6 +1,7 @@
 """Data sheets and tables of beams of the user's own, and sensors where they cannot see."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ wavelength_nm: 905
 seen: {reflectance: 0.1, range_m: 50}
 white_intensity: 0.4
 """
+PLACE = re.compile(r"\w+\.(?:yaml|csv):\d+:\d+: ")
 CONFIG = """\
 template: street
 sensors:
@@ -89,32 +91,6 @@ def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None
         abs(azimuth[0] - azimuth[1]), 354.0, abs_tol=1e-3
     )
     assert device.rotation_hz == 10
-
-
-@pytest.mark.parametrize(("table", "message"), [
-    ("elevation_rad\n1\n", "table.csv:1:1: unknown column 'elevation_rad'; expected"),
-    ("azimuth_offset_deg\n1\n", "table.csv:1:1: expected columns elevation_deg"),
-    ("elevation_deg\n1\n one\n", "table.csv:3:2: elevation_deg: expected a number, got 'one'"),
-    ("elevation_deg\n1, 2\n", "table.csv:2:1: expected 1 numbers, got 2"),
-    ("elevation_deg\n1\n-91\n", "table.csv:3:1: sensors[1].beams[1][0]"),
-    ("", "table.csv:1:1: expected columns"),
-])  # fmt: skip
-def test_a_wrong_table_is_told_with_its_place(table: str, message: str, tmp_path: Path) -> None:
-    assert message in told(tmp_path, "beams: table.csv", table_csv=table)
-
-
-@pytest.mark.parametrize(("line", "sheet", "message"), [
-    ("model: sheet.yaml", SHEET.replace("60]", "6o]"), "sheet.yaml:4:16: sensors[1].model.ran"),
-    ("model: sheet.yaml", SHEET.replace("range_noise_m", "range_noise_cm"), "sheet.yaml:5:1"),
-    ("model: none.yaml", SHEET, "mine.yaml:5:12: there is no file 'none.yaml'"),
-    ("model: table.csv", SHEET, "mine.yaml:5:12: model: a table of beams belongs into 'beams'"),
-    ("beams: sheet.yaml", SHEET, "mine.yaml:5:12: beams: expected a list, or the name of a"),
-    ("model: HDL64", SHEET, "mine.yaml:5:12: sensors[1].model: expected one of"),
-])  # fmt: skip
-def test_what_is_wrong_with_a_model_is_told_with_its_place(
-    line: str, sheet: str, message: str, tmp_path: Path
-) -> None:
-    assert message in told(tmp_path, line, sheet_yaml=sheet)
 
 
 CAR = FakeLibrary({"car": box_mesh((4.0, 1.8, 1.5))})
@@ -185,22 +161,6 @@ def test_lasers_listed_in_the_order_of_firing_keep_their_own_offsets(tmp_path: P
     assert list(elevation) == sorted(elevation, reverse=True)
 
 
-@pytest.mark.parametrize(("lasers", "offsets", "fact"), [
-    ("[-10, 5, 0, -5]", "[1, 2]", "azimuth_offsets_deg: expected one number for each of 4 lasers, "
-     "as they are not listed from the top, or fewer that repeat evenly, got 2"),
-    ("[5, 0, -5]", "[1, 2]", "expected one number for each of 3 lasers, or fewer that"),
-    ("[5, 0]", "[1, 2, 3]", "expected one number for each of 2 lasers, or fewer that"),
-    ("[{first: 5, last: 0, count: 4}]", "[1, 2, 3]", "for each of 4 lasers, or fewer"),
-])  # fmt: skip
-def test_offsets_that_belong_to_no_laser_are_refused(
-    tmp_path: Path, lasers: str, offsets: str, fact: str
-) -> None:
-    text = f"like: VLP-16\nelevations_deg: {lasers}\nazimuth_offsets_deg: {offsets}\n"
-    message = told(tmp_path, "model: s.yaml", s_yaml=text)
-    assert message.startswith("s.yaml:")
-    assert fact in message
-
-
 @pytest.mark.slow
 def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
     """0.5 degrees: 720 of each laser, at any speed of rotation; 2 s / 20 turns / 720 apart."""
@@ -212,25 +172,54 @@ def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
         assert sensor.device.azimuth_offsets_deg == ()
 
 
-@pytest.mark.parametrize(
-    ("text", "fact"),
-    [
-        ("elevations_deg: [-10, -5, 0, 5]\n",
-         "s.yaml:1:1: lacks rotation_hz, range_m, range_noise_m, range_step_m, divergence_mrad, "
-         "pulse_m, wavelength_nm, seen, white_intensity; give them, or name a scanner that has the "
-         "same: like: VLP-16"),
-        ("like: VLP\n", "s.yaml:1:7: like: expected one of HDL-32E"),
-        ("like: VLP-16\nelevations_deg: [a]\n", "s.yaml:2:18: sensors[1].model.elevations_deg[0]"),
-        ("like: VLP-16\nelevations_deg: [95]\n", "elevations_deg[0]"),
-        ("like: VLP-16\nelevations_deg: []\n", "expected either elevations_deg or prisms"),
-        ("like: VLP-16\npoints_per_second: 9\nazimuth_step_deg: 1\n",
-         "expected either points_per_second or azimuth_step_deg"),
-        ("like: VLP-16\nrate_hz: 9\n", "unknown key 'rate_hz'"),
-    ],
-)  # fmt: skip
-def test_a_short_faulty_sheet_is_refused_in_one_message(
-    tmp_path: Path, text: str, fact: str
+SHORT, TABLE, OTHER = "model: s.yaml", "beams: table.csv", "mine.yaml:5:12: "
+FAULTS = [
+    (TABLE, "elevation_rad\n1\n", "table.csv:1:1: unknown column 'elevation_rad'; expected"),
+    (TABLE, "azimuth_offset_deg\n1\n", "table.csv:1:1: expected columns elevation_deg"),
+    (TABLE, "elevation_deg\n1\n one\n",
+     "table.csv:3:2: elevation_deg: expected a number, got 'one'"),
+    (TABLE, "elevation_deg\n1, 2\n", "table.csv:2:1: expected 1 numbers, got 2"),
+    (TABLE, "elevation_deg\n1\n-91\n", "table.csv:3:1: sensors[1].beams[1][0]"),
+    (TABLE, "", "table.csv:1:1: expected columns"),
+    (SHORT, SHEET.replace("60]", "6o]"), "s.yaml:4:16: sensors[1].model.ran"),
+    (SHORT, SHEET.replace("range_noise_m", "range_noise_cm"),
+     "s.yaml:1:1: sensors[1].model.range_noise_m: miss | s.yaml:5:1: sensors[1].model.range_noi"),
+    ("model: none.yaml", SHEET, OTHER + "there is no file 'none.yaml'"),
+    ("model: table.csv", SHEET, OTHER + "model: a table of beams belongs into 'beams'"),
+    ("beams: s.yaml", SHEET, OTHER + "beams: expected a list, or the name of a"),
+    ("model: HDL64", SHEET, OTHER + "sensors[1].model: expected one of"),
+    (SHORT, "elevations_deg: [-10, -5, 0, 5]\n",
+     "s.yaml:1:1: lacks rotation_hz, range_m, range_noise_m, range_step_m, divergence_mrad, "
+     "pulse_m, wavelength_nm, seen, white_intensity; give them, or name a scanner that has the "
+     "same: like: VLP-16"),
+    (SHORT, "like: VLP\n", "s.yaml:1:7: like: expected one of HDL-32E"),
+    *((SHORT, f"like: VLP-16\n{rest}\n", f"s.yaml:{fact}") for rest, fact in (
+        ("elevations_deg: [a]", "2:18: sensors[1].model.elevations_deg[0]"),
+        ("elevations_deg: [95]", "2:18: sensors[1].model.elevations_deg[0]"),
+        ("elevations_deg: []", "1:1: sensors[1].model: expected either elevations_deg or prisms"),
+        ("points_per_second: 9\nazimuth_step_deg: 1",
+         "1:1: sensors[1].model: expected either points_per_second or azimuth_step_deg"),
+        ("rate_hz: 9", "2:1: sensors[1].model.rate_hz: unknown key 'rate_hz'"),
+    )),
+    # Offsets that belong to no laser.
+    *((SHORT, f"like: VLP-16\nelevations_deg: {lasers}\nazimuth_offsets_deg: {offsets}\n",
+       f"s.yaml:1:1: sensors[1].model: azimuth_offsets_deg: expected one number for each of {fact}")
+      for lasers, offsets, fact in (
+        ("[-10, 5, 0, -5]", "[1, 2]",
+         "4 lasers, as they are not listed from the top, or fewer that repeat evenly, got 2"),
+        ("[5, 0, -5]", "[1, 2]", "3 lasers, or fewer that"),
+        ("[5, 0]", "[1, 2, 3]", "2 lasers, or fewer that"),
+        ("[{first: 5, last: 0, count: 4}]", "[1, 2, 3]", "4 lasers, or fewer"),
+    )),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("line", "content", "expected"), FAULTS)
+def test_faults_of_sheets_and_tables_are_refused_in_one_message_at_their_place(
+    tmp_path: Path, line: str, content: str, expected: str
 ) -> None:
-    message = told(tmp_path, "model: s.yaml", s_yaml=text)
-    assert fact in message
-    assert message.count("s.yaml:") == 1
+    files = {"table_csv" if line == TABLE else "s_yaml": content}
+    message = told(tmp_path, line, **files)
+    facts = expected.split(" | ")
+    assert all(fact in message for fact in facts)
+    assert len(PLACE.findall(message)) == len(facts)

@@ -6,35 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.core import errors, se3, streams
+from gen_data.core import errors, se3
 from gen_data.core.asset_types import SURFACES
-from gen_data.core.capture import PATHS, POINT, LidarHits, LidarRays, PointCloud, SecondaryHits
-from gen_data.core.scene import Camera, Lidar, Scene, Weather
+from gen_data.core.capture import POINT, LidarHits, LidarRays, SecondaryHits
+from gen_data.core.scene import Lidar, Scene, Weather
 from gen_data.core.serialization import to_plain
-from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar import lidar_atmosphere, lidar_detection
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from gen_data.sensors.lidar.scan_pattern import lidar_model
+from tests.sensors.scanned import MIRRORED, capture, echoes, paths_of, rng, scene_with, with_mirrors
 
 MODEL = lidar_model("VLP-16")
-
-
-def rng(seed: int = 0) -> streams.Rng:
-    return streams.Streams(seed=seed, scene=0).rng("sensor/lidar")
-
-
-def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> LidarHits:
-    """Hits on instance 7 of category 2, where there is any."""
-    ranges_m = np.asarray(ranges_m, np.float32)
-    hit = np.isfinite(ranges_m)
-    return LidarHits(
-        ranges_m,
-        np.where(hit, np.float32(reflectance), np.float32(0)),
-        hit.astype(np.float32),
-        np.where(hit, 7, 0).astype(np.uint16),
-        np.where(hit, 2, 0).astype(np.uint16),
-        np.zeros(ranges_m.shape, np.uint8),
-    )
 
 
 class Wall:
@@ -47,19 +29,11 @@ class Wall:
         shape = (len(beams.directions), beams.subrays)
         return echoes(np.full(shape, self.range_m), self.reflectance)
 
-    def render(self, scene: Scene, camera: Camera, channels: object) -> None:
-        raise AssertionError("a laser scanner takes no picture")
-
-
-def scene_with(sensor: LidarSensor, weather: Weather | None = None) -> Scene:
-    scene = sensor.mount(RgbCamera(name="color").mount(Scene("t")))
-    return replace(scene, weather=weather or Weather())
-
 
 def scan(sensor: LidarSensor, wall: Wall, weather: Weather | None = None, seed: int = 0):  # noqa: ANN201
-    cloud = sensor.capture(scene_with(sensor, weather), wall, frozenset(), rng(seed))
-    assert isinstance(cloud, PointCloud) and cloud.points.dtype == POINT
-    return cloud.points
+    points = capture(sensor, wall, weather, seed).points
+    assert points.dtype == POINT
+    return points
 
 
 def test_an_ideal_scan_reports_every_hit_where_it_is_through_a_clean_window() -> None:
@@ -91,15 +65,10 @@ def test_an_ideal_scan_reports_every_hit_where_it_is_through_a_clean_window() ->
 
 
 class Mirrors(Wall):
-    """A renderer whose first three rays also see a wall in a mirror, the fourth behind glass."""
+    """A renderer whose first three beams also see a wall in a mirror, the fourth behind glass."""
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
-        hits = super().scan(scene, lidar, beams)
-        surface = np.array([SURFACES.index("mirrored")] * 3 + [0], np.uint8)
-        far_m, bright = np.full(4, 50.0, np.float32), np.ones(4, np.float32)
-        ids = np.array([0, 0, 0, 9], np.uint16)
-        detours = SecondaryHits(np.arange(4) * beams.subrays, far_m, bright, ids, ids, surface)
-        return replace(hits, detours=detours)
+        return with_mirrors(super().scan(scene, lidar, beams), beams, np.arange(4), 1.0)
 
 
 @pytest.mark.parametrize("returns", ["strongest", "last", "dual"])
@@ -110,19 +79,9 @@ def test_an_ideal_scan_has_nothing_behind_mirrors(returns: lidar_detection.Kept)
     ideal = scan(LidarSensor(model="VLP-16", ideal=True, returns=returns), seen)
 
     far = np.linalg.norm(ideal["position_m"].astype(float), axis=1) > 40.0
-    assert (real["surface"] == SURFACES.index("mirrored")).sum() == 3
-    assert (ideal["surface"] != SURFACES.index("mirrored")).all()
+    assert (real["surface"] == MIRRORED).sum() == 3
+    assert (ideal["surface"] != MIRRORED).all()
     assert ideal["instance_id"][far].tolist() == [9]
-
-
-class ShownMirrors(Mirrors):
-    """As Mirrors; they show instance 5, at (1, 2, 3) of the scanner."""
-
-    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
-        hits = super().scan(scene, lidar, beams)
-        assert beams.mirrored and hits.detours is not None
-        ids, place = np.array([5, 5, 5, 0], np.uint16), np.full((4, 3), (1, 2, 3), np.float32)
-        return replace(hits, detours=replace(hits.detours, mirrored_id=ids, mirrored_m=place))
 
 
 @pytest.mark.parametrize("divergence", [False, True])
@@ -136,23 +95,17 @@ def test_origins_say_how_light_came_and_from_where(
     """
     plain = LidarSensor(model="VLP-16", divergence=divergence, returns=returns)
     sensor = plain.model_copy(update={"origins": True})
-    seen = ShownMirrors(30.0, reflectance=0.01 if not divergence else 0.5)
+    seen = Mirrors(30.0, reflectance=0.01 if not divergence else 0.5)
     scene = scene_with(sensor)
     pose = se3.SE3.about_z(0.5, (7.0, -3.0, 2.0))
     lidar = replace(scene.lidars[0], T_world_lidar=pose)
     cloud = sensor.capture(replace(scene, lidars=(lidar,)), seen, frozenset(), rng())  # type: ignore[arg-type]
-    origins, points = cloud.origins, cloud.points
-    assert origins is not None and len(origins) == len(points)
-    np.testing.assert_array_equal(points, scan(plain, Mirrors(30.0, seen.reflectance)))
+    np.testing.assert_array_equal(cloud.points, scan(plain, seen))
 
-    path = np.array(PATHS)[origins["path"]]
-    mirrored = points["surface"] == SURFACES.index("mirrored")
-    assert ((path == "mirror") == mirrored).all()
-    assert ((path == "glass") == (points["instance_id"] == 9)).all()
+    path, origins = paths_of(cloud), cloud.origins
+    mirrored = path == "mirror"
     if not divergence:
         assert (mirrored.sum(), (path == "glass").sum()) == (3, 1)
-    expected = np.where(mirrored, 5, points["instance_id"])
-    np.testing.assert_array_equal(origins["true_instance_id"], expected)
     shown = np.broadcast_to(pose.apply(np.array([1.0, 2.0, 3.0])), (mirrored.sum(), 3))
     np.testing.assert_allclose(origins["true_position_m"][mirrored], shown, rtol=1e-6)
     away = np.linalg.norm(origins["true_position_m"] - pose.translation_m, axis=1)
@@ -162,19 +115,25 @@ def test_origins_say_how_light_came_and_from_where(
 
 def test_an_ideal_scan_has_no_mirrored_origins_and_other_scans_have_none_at_all() -> None:
     sensor = LidarSensor(model="VLP-16", ideal=True, origins=True)
-    cloud = sensor.capture(scene_with(sensor), ShownMirrors(30.0), frozenset(), rng())  # type: ignore[arg-type]
+    cloud = capture(sensor, Mirrors(30.0))
     assert cloud.origins is not None and set(np.unique(cloud.origins["path"])) <= {0, 1}
     assert cloud.lidar.origins and "origins" in to_plain(cloud.lidar)
 
     plain = LidarSensor(model="VLP-16", ideal=True)
-    cloud = plain.capture(scene_with(plain), Mirrors(30.0), frozenset(), rng())  # type: ignore[arg-type]
+    cloud = capture(plain, Mirrors(30.0))
     assert cloud.origins is None and "origins" not in to_plain(cloud.lidar)
 
 
+class Silent(Mirrors):
+    """A renderer that is silent about mirrors."""
+
+    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
+        return super().scan(scene, lidar, replace(beams, mirrored=False))
+
+
 def test_a_renderer_that_does_not_state_what_mirrors_show_is_named() -> None:
-    sensor = LidarSensor(model="VLP-16", origins=True)
     with pytest.raises(errors.SampleError, match="sensor 'lidar': origins: this renderer does not"):
-        sensor.capture(scene_with(sensor), Mirrors(30.0), frozenset(), rng())  # type: ignore[arg-type]
+        capture(LidarSensor(model="VLP-16", origins=True), Silent(30.0))
 
 
 def test_range_noise_is_that_of_the_data_sheet_on_steps_of_the_device() -> None:
