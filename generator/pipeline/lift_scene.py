@@ -288,7 +288,7 @@ def _box(size_m: Vec3) -> str:
 
 @lru_cache(maxsize=64)
 def _top_m(height_m: float, assets: AssetLibrary) -> float:
-    """Height of the upper side of boxes of one height; most bases have lengths of their own."""
+    """Height of the upper side of boxes of one height; few bases are equally long."""
     return assets.bounds_m(_box((1.0, 1.0, height_m)))[1][2]
 
 
