@@ -59,23 +59,45 @@ def segmentation_target(sample: Sample, camera: str = "") -> tuple[NDArray[np.ui
     return _channels_first(reading.rgb), _boxes(sample, reading, objects) | {"masks": masks}
 
 
-def keypoint_target(sample: Sample, camera: str = "") -> tuple[NDArray[np.uint8], Arrays]:
-    """As ``detection_target`` for the objects with keypoints of the first skeleton in the image.
+def keypoint_target(
+    sample: Sample, camera: str = "", category: str = ""
+) -> tuple[NDArray[np.uint8], Arrays]:
+    """As ``detection_target`` for the objects of one category with keypoints.
 
     Adds ``keypoints`` float32 [n, k, 3]: x, y and COCO's visibility, of all points of the skeleton.
+    Without such an object, k is 0.
+
+    Args:
+        sample: The sample.
+        camera: Name of the camera; empty = the first one with a colour image.
+        category: Name of the category; empty = all, which must have one skeleton.
+
+    Raises:
+        ConfigError: objects have several skeletons, whose points a model would mix up:
+            torchvision's loss takes rows of any number of points without an error.
     """
     reading = _camera(sample, camera)
-    jointed = [thing for thing in _visible(reading) if thing.keypoints]
-    skeleton = find_skeleton([p.name for p in jointed[0].keypoints or ()]) if jointed else None
-    objects, rows = [], []
+    jointed = [
+        thing
+        for thing in _visible(reading)
+        if thing.keypoints and category in ("", thing.instance.category)
+    ]
+    kinds = {find_skeleton([p.name for p in thing.keypoints or ()]) for thing in jointed}
+    if len(kinds) > 1:
+        found = sorted({thing.instance.category for thing in jointed})
+        raise ConfigError(
+            f"sample {sample.index} has objects with different keypoints: {', '.join(found)}; name "
+            f'one, such as functools.partial(keypoint_target, category="{found[-1]}")'
+        )
+    skeleton = next(iter(kinds), None)
+    rows = []
     for thing in jointed:
         points = {p.name: (*p.image_px, p.visibility) for p in thing.keypoints or ()}
-        if skeleton is not None and points.keys() <= set(skeleton.names):
-            objects.append(thing)
-            rows.append([points.get(name, (0.0, 0.0, 0)) for name in skeleton.names])
+        names = skeleton.names if skeleton is not None else ()
+        rows.append([points.get(name, (0.0, 0.0, 0)) for name in names])
     count = len(skeleton.names) if skeleton is not None else 0
     keypoints = np.array(rows, np.float32).reshape(len(rows), count, 3)
-    target = _boxes(sample, reading, objects) | {"keypoints": keypoints}
+    target = _boxes(sample, reading, jointed) | {"keypoints": keypoints}
     return _channels_first(reading.rgb), target
 
 

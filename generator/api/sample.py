@@ -315,7 +315,8 @@ class Sample:
 
     def image_id(self, camera: str) -> int:
         """Number of a camera's image, from 1, unique in the data set: its id in the COCO export."""
-        return image_number(self.index, self.core.cameras, camera)
+        names = self.core.cameras or tuple(sorted(self.core.truth))
+        return image_number(self.index, names, camera)
 
     @property
     def lidars(self) -> Mapping[str, PointCloud]:

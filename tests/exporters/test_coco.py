@@ -17,10 +17,11 @@ from pycocotools.cocoeval import COCOeval
 from gen_data.annotations.annotate import Thresholds
 from gen_data.api.sample import Sample as SampleView
 from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Weather
 from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
-from gen_data.targets import detection_target
+from gen_data.targets import detection_target, keypoint_target
 from tests.exporters.datasets import made_of
 from tests.exporters.drives import drive_info
 from tests.exporters.label_readers import opened
@@ -359,3 +360,20 @@ def test_targets_of_trainers_have_the_image_ids_of_the_file(world: Any, tmp_path
     }
     assert found == listed
     assert len(set(found.values())) == 12
+
+
+def test_targets_of_keypoints_have_one_skeleton(world: Any, tmp_path: Path) -> None:
+    """The same points as the file of the category; a model of 17 points gets none of a car's."""
+    info = world.info(7)
+    folder = world.export(Coco(), info, world.samples, tmp_path)
+    document = json.loads((folder / "annotations/pedestrian_keypoints_train.json").read_text())
+    sample = SampleView(world.samples[0])
+    with pytest.raises(ConfigError, match="different keypoints: car, pedestrian; name one"):
+        keypoint_target(sample)
+    _, target = keypoint_target(sample, category="pedestrian")
+    rows = [a for a in document["annotations"] if a["image_id"] == int(target["image_id"])]
+    expected = np.array([row["keypoints"] for row in rows], np.float32).reshape(-1, 17, 3)
+    assert len(expected) > 0
+    np.testing.assert_allclose(target["keypoints"], expected, atol=1e-3)
+    assert target["boxes"][:, :2].tolist() == [row["bbox"][:2] for row in rows]
+    assert keypoint_target(sample, category="crate")[1]["keypoints"].shape == (0, 0, 3)
