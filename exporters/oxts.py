@@ -93,21 +93,9 @@ def rig_motion(scene: Scene, mount: Mount) -> RigMotion:
 def carried_motion(
     pose: se3.SE3, origin_m: se3.Vec3, track: Trajectory, time_s: float
 ) -> RigMotion:
-    """Motion of a frame on a body at an instant of its trajectory.
-
-    With the lever arm r of the frame, the velocity is ``v + w x r`` and the acceleration
-    ``a + dw/dt x r + w x (w x r)``.
-    """
-    twist = track.twist(time_s)
-    arm_m = np.subtract(pose.translation_m, origin_m)
-    turning = np.array(twist.angular_velocity_rad_s)
-    swing_m_s = np.cross(turning, arm_m)
-    velocity = np.add(twist.velocity_m_s, swing_m_s)
-    inward = np.cross(turning, swing_m_s) + np.cross(track.angular_acceleration(time_s), arm_m)
-    acceleration = np.add(twist.acceleration_m_s2, inward)
-    vx, vy, vz = (float(v) for v in velocity)
-    ax, ay, az = (float(v) for v in acceleration)
-    return RigMotion(pose, Twist((vx, vy, vz), (ax, ay, az), twist.angular_velocity_rad_s))
+    """Motion of a frame on a body with a place [m] at an instant of its trajectory."""
+    x, y, z = (a - b for a, b in zip(pose.translation_m, origin_m, strict=True))
+    return RigMotion(pose, track.carried_twist(time_s, (x, y, z)))
 
 
 def oxts_row(motion: RigMotion, origin_deg: tuple[float, float]) -> str:

@@ -119,6 +119,22 @@ class Trajectory:
             self._angular_velocity(k + f),
         )
 
+    def carried_twist(self, time_s: float, arm_m: se3.Vec3) -> Twist:
+        """Motion of a point on the body at an instant.
+
+        With the lever arm r of the point, the velocity is ``v + w x r`` and the acceleration
+        ``a + dw/dt x r + w x (w x r)``.
+
+        Args:
+            time_s: The instant.
+            arm_m: From the body's origin to the point, outer axes.
+        """
+        body = self.twist(time_s)
+        spin = body.angular_velocity_rad_s
+        swing = _cross(spin, arm_m)
+        inward = _sum(_cross(spin, swing), _cross(self.angular_acceleration(time_s), arm_m))
+        return Twist(_sum(body.velocity_m_s, swing), _sum(body.acceleration_m_s2, inward), spin)
+
     def angular_acceleration(self, time_s: float) -> se3.Vec3:
         """Angular acceleration [rad/s^2] at an instant, outer axes; 0 outside the knots.
 
@@ -296,6 +312,14 @@ class StateChange:
     asset: str = ""
     materials: tuple[asset_types.Material, ...] = ()
     attributes: tuple[tuple[str, str], ...] = ()
+
+
+def _cross(a: se3.Vec3, b: se3.Vec3) -> se3.Vec3:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _sum(a: se3.Vec3, b: se3.Vec3) -> se3.Vec3:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def _extrapolate(one: se3.Vec3, other: se3.Vec3, share: float) -> se3.Vec3:

@@ -16,7 +16,7 @@ from gen_data.core.scene import (
     Rig,
     Scene,
 )
-from gen_data.core.se3 import SE3, Vec3, rotate_by_quaternion
+from gen_data.core.se3 import SE3, rotate_by_quaternion
 
 RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
 """``T_camera_rig``: X forward, Y left, Z up in the camera's X right, Y down, Z forward."""
@@ -139,21 +139,9 @@ def rig_twist(scene: Scene, rig: Rig) -> Twist:
     track = scene.track(rig.body)
     if track is None:
         return STILL
-    body = track.twist(scene.time_s)
     T_world_body = scene.body(rig.body).T_world_body
-    arm = rotate_by_quaternion(T_world_body.quaternion_wxyz, rig.T_body_rig.translation_m)
-    spin = body.angular_velocity_rad_s
-    lever = _cross(spin, arm)
-    inward = _cross(spin, lever)
-    return Twist(_sum(body.velocity_m_s, lever), _sum(body.acceleration_m_s2, inward), spin)
-
-
-def _cross(a: Vec3, b: Vec3) -> Vec3:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _sum(a: Vec3, b: Vec3) -> Vec3:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+    arm_m = rotate_by_quaternion(T_world_body.quaternion_wxyz, rig.T_body_rig.translation_m)
+    return track.carried_twist(scene.time_s, arm_m)
 
 
 def _accumulate_changes(changes: tuple[StateChange, ...], time_s: float) -> dict[str, StateChange]:

@@ -13,7 +13,7 @@ from scipy.special import fresnel
 from gen_data.core.errors import ConfigError
 from gen_data.core.motion import STILL, Twist
 from gen_data.core.scene import Device
-from gen_data.core.scene_time import scene_at
+from gen_data.core.scene_time import rig_twist, scene_at
 from gen_data.core.se3 import SE3
 from gen_data.exporters.kitti_raw import KittiRaw
 from gen_data.exporters.nuscenes_can_bus import motion_at
@@ -108,8 +108,8 @@ def test_a_pose_without_motion_is_where_the_rig_stands(world: Any, tmp_path: Pat
 def test_a_lever_arm_feels_the_growth_of_a_turn() -> None:
     """On a clothoid, 2 m ahead of the origin: a + dw/dt x r + w x (w x r), dw/dt = 0.2 rad/s^2.
 
-    Goldstein, Classical Mechanics, 4.10. The rows, the CAN bus and the positions, differentiated
-    twice, agree.
+    Goldstein, Classical Mechanics, 4.10. The rows, the CAN bus, the labels and the positions,
+    differentiated twice, agree.
     """
     unit_s = math.sqrt(math.pi / 0.2)
 
@@ -129,6 +129,8 @@ def test_a_lever_arm_feels_the_growth_of_a_turn() -> None:
         assert row[[14, 15]] == pytest.approx([-2.0 * turn**2, 10.0 * turn + 0.4], abs=0.03), k
         force = motion_at(on_rig, "ego", time_s).twist.acceleration_m_s2
         assert force == pytest.approx(motion.twist.acceleration_m_s2, abs=1e-6)
+        labelled = rig_twist(scene_at(on_rig, time_s), on_rig.rigs[0])
+        assert labelled.acceleration_m_s2 == pytest.approx(force, abs=1e-6)
 
 
 def test_navigation_in_a_growing_turn_is_that_of_its_instant() -> None:
