@@ -170,10 +170,15 @@ def refusal(engine: Engine, scene: Scene) -> Rejection:
 
 
 def thing(
-    name: str, asset: str, x: float = 0.0, y: float = 0.0, above_m: float = 0.2, **more: Any
-) -> Body:
-    """A body whose origin is some height above the table's top."""
-    return Body(name, asset, SE3((x, y, TABLE_TOP_Z_M + above_m)), mass_kg=0.3, **more)
+    name: str, asset: str, x: float = 0.0, y: float = 0.0, above_m: float = 0.2,
+    turn_deg: float = 0.0, axis: int = 0, **more: Any,
+) -> Body:  # fmt: skip
+    """A body whose origin is some height above the table's top, turned about X (0), Y or Z."""
+    half_rad = math.radians(0.5 * turn_deg)
+    turn = [math.cos(half_rad), 0.0, 0.0, 0.0]
+    turn[1 + axis] = math.sin(half_rad)
+    pose = SE3((x, y, TABLE_TOP_Z_M + above_m), tuple(turn))  # type: ignore[arg-type]
+    return Body(name, asset, pose, mass_kg=0.3, **more)
 
 
 HOUSEHOLD = (

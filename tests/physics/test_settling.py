@@ -58,20 +58,14 @@ def test_nothing_floats_above_or_sinks_into_its_support(
 
 def test_what_rests_on_an_edge_before_tipping_over_lies_flat_afterwards(engine: Engine) -> None:
     """A book that starts at 40 degrees ends on its cover; no damping holds it up."""
-    turn = (math.cos(math.radians(20)), math.sin(math.radians(20)), 0.0, 0.0)
-    book = thing("book", "box 0.15 0.22 0.025")
-    book = replace(book, T_world_body=SE3(book.T_world_body.translation_m, turn))
+    book = thing("book", "box 0.15 0.22 0.025", turn_deg=40)
 
     assert tilt_rad(accepted(engine, table_scene(book)).body("book")) < math.radians(0.5)
 
 
 def test_a_cone_on_its_tip_falls_over(engine: Engine) -> None:
     """The centre of mass is a quarter of the height from the base, and the tip no support."""
-    upside_down = (math.cos(math.radians(88)), math.sin(math.radians(88)), 0.0, 0.0)
-    cone = thing("cone", "cone 0.04 0.12")
-    cone = replace(cone, T_world_body=SE3(cone.T_world_body.translation_m, upside_down))
-
-    scene = accepted(engine, table_scene(cone))
+    scene = accepted(engine, table_scene(thing("cone", "cone 0.04 0.12", turn_deg=176)))
 
     assert math.radians(45) < tilt_rad(scene.body("cone")) < math.radians(135)
 
@@ -91,10 +85,7 @@ def test_a_stack_of_three_boxes_stays_a_stack(engine: Engine) -> None:
 
 def test_nothing_leans_on_a_wall_that_is_not_there(engine: Engine) -> None:
     """A board that would lean on a guard wall is dropped again farther in, and lies flat."""
-    half = math.radians(8)
-    board = thing("board", "box 0.02 0.12 0.30", x=0.54, above_m=0.17)
-    turn = (math.cos(half), 0.0, math.sin(half), 0.0)
-    board = replace(board, T_world_body=SE3(board.T_world_body.translation_m, turn))
+    board = thing("board", "box 0.02 0.12 0.30", x=0.54, above_m=0.17, turn_deg=16, axis=1)
 
     scene = accepted(engine, table_scene(board))
 
@@ -112,9 +103,7 @@ def test_a_body_dropped_beside_the_table_is_refused_as_fallen_off(engine: Engine
 
 
 def ball_on_a_slope() -> Scene:
-    slope = thing("slope", "box 0.2 0.2 0.01", x=0.45, above_m=0.06)
-    turn = (math.cos(math.radians(15)), 0.0, math.sin(math.radians(15)), 0.0)
-    slope = replace(slope, T_world_body=SE3(slope.T_world_body.translation_m, turn))
+    slope = thing("slope", "box 0.2 0.2 0.01", x=0.45, above_m=0.06, turn_deg=30, axis=1)
     scene = table_scene(thing("ball", "ball 0.035", x=0.45, above_m=0.2))
     return replace(scene, bodies=(*scene.bodies, slope))
 

@@ -164,44 +164,36 @@ class Undefined:
         return NAN
 
 
-@pytest.mark.parametrize("field", ["saturation", "vignetting", "blur_px", "glare"])
-def test_a_setting_of_a_camera_that_is_nan_makes_no_photograph(field: str) -> None:
+NOISE = ImageSensor().model_copy(update={"read_noise_e": Undefined()})
+
+
+@pytest.mark.parametrize(("field", "value", "fault"), [
+    *((name, Undefined(), rf"image_pipeline\.{name}: drew nan")
+      for name in ("saturation", "vignetting", "blur_px", "glare")),
+    # It is drawn within the sensor; its image is checked before the tone curve.
+    ("image_sensor", NOISE, r"color\.image_pipeline: a stage makes NaN"),
+])  # fmt: skip
+def test_a_setting_of_a_camera_that_is_nan_makes_no_photograph(
+    field: str, value: object, fault: str
+) -> None:
     """The tone curve would make black of it, or a comparison leave the stage out."""
     rng = Streams(1, 0).rng("camera")
     camera = Camera("color", IDENTITY, Intrinsics.from_hfov(16, 12, hfov_rad=1.0), ev100=9.0)
-    pipeline = ImagePipeline().model_copy(update={field: Undefined()})
+    pipeline = ImagePipeline().model_copy(update={field: value})
     radiance = np.full((12, 16, 3), 100.0, np.float32)
 
-    with pytest.raises(SampleError, match=rf"image_pipeline\.{field}: drew nan"):
+    with pytest.raises(SampleError, match=fault):
         develop(take_shot(radiance, None, camera, Weather(), pipeline, rng))
 
 
-def test_noise_of_a_sensor_that_is_nan_makes_no_photograph() -> None:
-    """It is drawn within the sensor; its image is checked before the tone curve."""
-    rng = Streams(1, 0).rng("camera")
-    camera = Camera("color", IDENTITY, Intrinsics.from_hfov(16, 12, hfov_rad=1.0), ev100=9.0)
-    sensor = ImageSensor().model_copy(update={"read_noise_e": Undefined()})
-    pipeline = ImagePipeline().model_copy(update={"image_sensor": sensor})
-    radiance = np.full((12, 16, 3), 100.0, np.float32)
-
-    with pytest.raises(SampleError, match=r"color\.image_pipeline: a stage makes NaN"):
-        develop(take_shot(radiance, None, camera, Weather(), pipeline, rng))
-
-
-@pytest.mark.parametrize("name", ["vertices_m", "normals", "uvs"])
-def test_a_mesh_with_nan_is_an_error_with_its_vertex(name: str) -> None:
-    """Physics would hang, and a hierarchy of boxes lose its triangles."""
+def test_a_mesh_with_nan_is_an_error_with_its_vertex_or_the_field_of_its_material() -> None:
+    """Physics would hang, a hierarchy of boxes lose its triangles; slots are in no scene's file."""
     mesh = open_library().mesh("mug?seed=0")
-    values = getattr(mesh, name).copy()
-    values[7, 1] = NAN
-
-    with pytest.raises(AssetError, match=rf"asset 'mine': {name}\[7\] is NaN or infinite"):
-        check_finite("mine", replace(mesh, **{name: values}))
-
-
-def test_a_material_of_a_mesh_with_nan_is_an_error_with_its_field() -> None:
-    """Slots of a mesh are not part of the scene's file."""
-    mesh = open_library().mesh("mug?seed=0")
+    for name in ("vertices_m", "normals", "uvs"):
+        values = getattr(mesh, name).copy()
+        values[7, 1] = NAN
+        with pytest.raises(AssetError, match=rf"asset 'mine': {name}\[7\] is NaN or infinite"):
+            check_finite("mine", replace(mesh, **{name: values}))
     with pytest.raises(AssetError, match=r"asset 'mine': materials\[0\]\.roughness is NaN"):
         check_finite("mine", replace(mesh, materials=(Material(roughness=NAN),)))
 
