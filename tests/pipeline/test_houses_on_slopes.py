@@ -90,12 +90,12 @@ def ramps() -> Iterator[tuple[Street, AssetLibrary, list[Body]]]:
     """The same villas with paths and plants, and a ramp wherever there is room for one."""
     scenery = [name for name in SCENERY if name not in ("buildings", "paths", "garden_plants")]
     config = load_config("street.yaml", overrides=(*FEW, *GIVEN), without=scenery)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(house_entrances, "_has_ramp", lambda house: True)
-        with open_pipeline(config) as pipeline:
+    with open_pipeline(config) as pipeline:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(house_entrances, "_has_ramp", lambda house: True)
             street = Street.first(pipeline)
-            found = [b for b in street.scene.bodies if b.name.endswith("/ramp0")]
-            yield street, pipeline.assets, found
+        found = [b for b in street.scene.bodies if b.name.endswith("/ramp0")]
+        yield street, pipeline.assets, found
 
 
 def _surface(ramp: Body, assets: AssetLibrary) -> tuple[np.ndarray, np.ndarray]:
