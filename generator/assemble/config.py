@@ -498,7 +498,8 @@ def _plugin(
     name = default if tag is None else tag.content
     where = (tag or node).position
     if not isinstance(name, str):
-        fact = f"expected one {table.kind} of: {', '.join(table)}"
+        named = "" if tag is not None else f"a mapping with '{table.tag}', which names "
+        fact = f"expected {named}one {table.kind} of: {', '.join(table)}"
         problems.add(where, f"{field}.{table.tag}", fact)
         return None
     try:

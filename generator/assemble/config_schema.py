@@ -26,6 +26,7 @@ def config_schema() -> dict[str, Any]:
             "type": "array",
             "items": {"oneOf": [INHERITED, *(_plugin(table, n, definitions) for n in table)]},
         }
+    properties["exporters"]["items"]["oneOf"].insert(1, {"enum": list(config.PLUGIN_LISTS["exporters"])})
     properties["render"] = {
         "description": "How images are made.",
         "anyOf": [_plugin(RENDERERS, name, definitions) for name in RENDERERS],

@@ -78,14 +78,26 @@ def resolve_document(
 
 
 def _with_files(document: Node) -> Node:
-    """Replace names of sheets and calibrations in sensors, of tasks in randomizers, by content."""
+    """Replace names of sheets and calibrations in sensors, of tasks in randomizers, by content.
+
+    The name of an exporter becomes a mapping: whole documents are compared.
+    """
     sensors, randomizers = document.entries["sensors"], document.entries["randomizers"]
+    exporters = document.entries["exporters"]
+    if isinstance(exporters.content, tuple):
+        exporters = exporters.with_children(_with_type)
     if isinstance(sensors.content, tuple):
         sensors = sensors.with_children(_with_sensor_files)
     if isinstance(randomizers.content, tuple):
         randomizers = randomizers.with_children(lambda _, randomizer: load_tasks(randomizer))
-    content = {**document.entries, "sensors": sensors, "randomizers": randomizers}
+    changed = {"sensors": sensors, "randomizers": randomizers, "exporters": exporters}
+    content = {**document.entries, **changed}
     return replace(document, content=content)
+
+
+def _with_type(_number: str | int, item: Node) -> Node:
+    """A mapping with the type that a text names."""
+    return Node(item.position, {"type": item}) if isinstance(item.content, str) else item
 
 
 def _with_sensor_files(number: str | int, sensor: Node) -> Node:

@@ -16,6 +16,8 @@ LONG = "a" * 65
     (f"elements.clutter.name={LONG}", "--set:1:23: elements[3].name: 'aaa"),
     ("exporters=[{type: coco}, {type: coco}]",
      "--set:1:33: exporters[1].type: the exporter 'coco' is listed twice; expected it once"),
+    ("sensors=[rgb_camera]", "--set:1:10: sensors[0].type: expected a mapping with 'type', which "
+     "names one sensor of: "),
     ("randomizers.clutter.count=1000000000", "--set:1:27: randomizers[0].count: 1000000000"),
 ])  # fmt: skip
 def test_names_counts_and_repetitions_are_refused_when_read(override: str, message: str) -> None:

@@ -83,6 +83,17 @@ def test_a_list_of_outputs_replaces_the_inherited_one(folder: Path) -> None:
     assert spec.exporters == ()
 
 
+def test_names_of_exporters_are_short_for_mappings(folder: Path) -> None:
+    """They give the same document, which runs are compared by, and may be left out."""
+    written(folder, BASE.replace("[{type: coco}]", "[coco, yolo]"), "base.yaml")
+    both, one = (
+        load_config(written(folder, f"extends: base.yaml\n{more}")).document
+        for more in ("", "without: {exporters: [yolo]}\n")
+    )
+    assert both.plain()["exporters"] == [{"type": "coco"}, {"type": "yolo"}]
+    assert one.plain()["exporters"] == [{"type": "coco"}]
+
+
 @pytest.mark.parametrize("key", ["annotations", "exporters"])
 def test_errors_in_a_list_of_outputs_count_its_own_items(folder: Path, key: str) -> None:
     """The second item of the user's list is number 1, whatever is inherited."""
