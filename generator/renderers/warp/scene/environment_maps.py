@@ -210,7 +210,7 @@ class DeviceEnvironment:
 
     Attributes:
         lamps: Lamps that replace the parts missing from ``rest``.
-        nbytes: Bytes owned: on the CPU, not those of a mapped file.
+        nbytes: Bytes owned: on the CPU, without mapped files.
     """
 
     irradiance: wp.array
