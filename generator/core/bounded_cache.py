@@ -1,8 +1,9 @@
-"""Caches bounded by bytes and by number of values."""
+"""Caches bounded by bytes, by number of values, or by the life of their values elsewhere."""
 
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
+from weakref import WeakValueDictionary
 
 
 class Sized(Protocol):
@@ -73,6 +74,24 @@ class CountCache(Generic[V]):
     def __contains__(self, name: str) -> bool:
         """Whether the value of that name is held."""
         return name in self._values
+
+    def __len__(self) -> int:
+        """How many values are held."""
+        return len(self._values)
+
+
+class HeldCache(Generic[V]):
+    """Values by name, for as long as somebody else holds them."""
+
+    def __init__(self) -> None:
+        self._values: WeakValueDictionary[str, V] = WeakValueDictionary()
+
+    def get(self, name: str, make: Callable[[], V]) -> V:
+        """The value of that name, made if nobody holds it."""
+        value = self._values.get(name)
+        if value is None:
+            value = self._values[name] = make()
+        return value
 
     def __len__(self) -> int:
         """How many values are held."""

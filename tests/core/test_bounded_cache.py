@@ -1,8 +1,8 @@
-"""Caches never exceed their bounds, and the least recently used values go first."""
+"""Caches never exceed their bounds; the least recently used values go first, or unused ones."""
 
 import numpy as np
 
-from gen_data.core.bounded_cache import ByteCache, CountCache
+from gen_data.core.bounded_cache import ByteCache, CountCache, HeldCache
 
 
 def test_bytes_are_bounded_whatever_the_sizes_and_a_larger_value_displaces_all() -> None:
@@ -54,3 +54,23 @@ def test_values_are_bounded_by_number_and_the_oldest_go() -> None:
     assert [name in cache for name in "abcd"] == [True, False, True, True]
     assert get("b") == 5
     assert len(cache) == 3
+
+
+def test_a_value_lives_as_long_as_somebody_holds_it() -> None:
+    """Meanwhile everybody gets the same one."""
+    cache: HeldCache[set[str]] = HeldCache()
+
+    class Value(set[str]):
+        """A set that weak references can refer to."""
+
+    made: list[str] = []
+
+    def get(name: str) -> set[str]:
+        return cache.get(name, lambda: made.append(name) or Value(name))
+
+    one, other = get("a"), get("b")
+    assert get("a") is one
+    del other
+    assert len(cache) == 1
+    assert get("b") == {"b"}
+    assert made == ["a", "b", "b"]

@@ -1,6 +1,7 @@
 """Caches of the renderer change no pixel and no point."""
 
 import ctypes
+import weakref
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Literal
@@ -15,7 +16,8 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Light, Scene, Weather
 from gen_data.renderers.warp import device, settings
 from gen_data.renderers.warp.renderer import WarpRenderer
-from gen_data.renderers.warp.scene import device_cache
+from gen_data.renderers.warp.scene import device_cache, environment_maps
+from gen_data.renderers.warp.scene.device_assets import DeviceMesh
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_world
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh
@@ -131,9 +133,33 @@ def test_meshes_of_one_scene_do_not_drive_out_those_that_scenes_share(
     cache.mesh("road 2")
 
     assert cache.mesh("box") is shared
-    assert cache.mesh("road 1") is not road
+    assert cache.mesh("road 1") is road
     cache.mesh("floor")
     assert cache.mesh("box") is not shared
+
+
+def test_meshes_of_one_scene_are_freed_with_it() -> None:
+    """The cache keeps the latest scene, however often its bodies move: two views share a road."""
+    library = StoringLibrary()
+    library.meshes |= {"road 1": plane_mesh(9.0), "road 2": plane_mesh(8.0)}
+    cache = DeviceCache(library, device.open_device("cpu"))
+
+    def pack(asset: str, x_m: float) -> weakref.ref[DeviceMesh]:
+        body = Body("road", asset, se3.SE3((x_m, 0.0, 0.0)))
+        pack_world(Scene("test", (body,)), EYES[0], cache)
+        return weakref.ref(cache.mesh(asset))
+
+    first = pack("road 1", 0.0)
+    assert pack("road 1", 1.0)() is first() is not None
+    pack("road 2", 0.0)
+    assert first() is None
+
+
+def test_an_environment_refers_to_its_image() -> None:
+    """On the CPU: a worker has each sky once, and of stored panoramas none."""
+    image = np.full((16, 32, 3), 1.0, np.float32)
+    light = environment_maps.upload_environment(image, device.open_device("cpu"))
+    assert light.image.ptr == image.__array_interface__["data"][0]
 
 
 def test_stored_hierarchies_and_mip_levels_give_the_same_image() -> None:

@@ -90,6 +90,8 @@ class WarpRenderer:
             return SensorReading(camera.name, camera, images, {}, scene.time_s)
         reading = self._render(scene, camera, channels, find_tones)
         self._labels.keep(scene, camera, reading)
+        # Photographs are developed now, which takes as much memory as rendering.
+        self._cache.limit_pages()
         return reading
 
     def _render(

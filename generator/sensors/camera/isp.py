@@ -267,13 +267,13 @@ def _look_up(table: NDArray[Any], image: Float32, scale: float) -> NDArray[Any]:
     return out
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=12)
 def _byte_table(tone: Tone, white: float, contrast: float) -> NDArray[np.uint8]:
     """Bytes of all positive float32, indexed by their leading bits."""
     return np.append(to_bytes(_displayed(tone, white, contrast)), np.uint8(255))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def _display_table(tone: Tone, white: float, contrast: float) -> Float32:
     """Display values of all positive float32, indexed by their leading bits."""
     return np.append(_displayed(tone, white, contrast), 1.0).astype(np.float32)

@@ -299,9 +299,9 @@ def _light_listed(
     cache, settings = frame.cache, frame.settings
     listed = lattice_lighting.ListedPixels()
     listed.pixels = pixels
-    # Powers of two, for which scratch memory seldom grows, plus a little: rows of lamps a power of
-    # two apart would collide in the processor's cache.
-    room = (1 << number.bit_length()) + 48
+    # An odd number of cache lines: rows of lamps a power of two apart would collide in the
+    # processor's cache.
+    room = (number // 32 + 1) * 32 + 16
     listed.lit = cache.scratch("listed lit", (around.lit.shape[0], room), float)
     listed.open_sky = cache.scratch("listed sky", (1, room), float)
     listed.exposed = cache.scratch("listed exposed", room, float)
@@ -345,14 +345,14 @@ def _refine_layers(
 
     cache = frame.cache
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)
-    places = cache.scratch("contrasts", frame.pixels, wp.int32)
+    places = cache.scratch("contrasts", max(number, 1), wp.int32)
     inputs = [*frame.inputs, listed, radiance]
     frame.launch(clearcoat_glass.find_contrasts, number, inputs, [count, places])
     found = int(count.numpy()[0])
     if not found:
         return
-    pixels = cache.scratch("contrast pixels", frame.pixels, wp.int32)
-    mixed = cache.scratch("contrast colours", frame.pixels, wp.vec3)
+    pixels = cache.scratch("contrast pixels", found, wp.int32)
+    mixed = cache.scratch("contrast colours", found, wp.vec3)
     offsets = cache.constant(wp.vec2, pixel_samples, _PARTS)
     probe.few = cache.constant(wp.vec2, _dealt_sunflower, _PARTS, _PARTS)
     find = frame.context.find_tones

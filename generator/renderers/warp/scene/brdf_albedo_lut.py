@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.core.asset_types import Float32
 
@@ -23,9 +24,15 @@ def lobe_albedo() -> Float32:
     """
     # Roughness 0 and grazing view are limits without a defined value.
     nodes = np.clip(np.arange(_ENTRIES) / (_ENTRIES - 1.0), 1e-3, 1.0)
-    roughness, n_v = nodes[:, None, None], nodes[None, :, None]
+    # Row by row: the intermediate arrays stay in the processor's caches.
+    return np.stack([_lobe_row(roughness, nodes) for roughness in nodes.tolist()])
+
+
+def _lobe_row(roughness: float, cosines: NDArray[np.float64]) -> Float32:
+    """Factors of ``lobe_albedo`` for one roughness, shape [n, 2], by cosines [n]."""
+    n_v = cosines[:, None]
     strata = (np.arange(_STRATA) + 0.5) / _STRATA
-    u1, u2 = (axis.reshape(1, 1, -1) for axis in np.meshgrid(strata, strata, indexing="ij"))
+    u1, u2 = (axis.reshape(1, -1) for axis in np.meshgrid(strata, strata, indexing="ij"))
     alpha = roughness**2
     n_h = np.sqrt((1.0 - u1) / (1.0 + (alpha**2 - 1.0) * u1))
     along = np.sqrt(1.0 - n_h**2) * np.cos(np.pi * u2)
@@ -35,7 +42,7 @@ def lobe_albedo() -> Float32:
     masking = 2.0 * n_l * n_v * (1.0 - alpha) + (n_l + n_v) * alpha
     weight = np.where(reflected, 2.0 * n_l * v_h / np.where(reflected, masking * n_h, 1.0), 0.0)
     fresnel = np.clip(1.0 - v_h, 0.0, 1.0) ** 5
-    factors = np.stack([(weight * (1.0 - fresnel)), (weight * fresnel)], axis=-1).mean(axis=2)
+    factors = np.stack([weight * (1.0 - fresnel), weight * fresnel], axis=-1).mean(axis=1)
     return np.asarray(factors.astype(np.float32))
 
 

@@ -50,7 +50,8 @@ def arrays_version() -> str:
     )
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+# Without slots: caches hold some by weak references.
+@dataclass(frozen=True, eq=False)
 class DeviceMesh:
     """Geometry of one asset on the device.
 
@@ -219,7 +220,8 @@ _NO_TEXELS = np.zeros(1, np.uint32)
 _NO_HOLE = np.full(1, 255, np.uint8)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+# Without slots: caches hold some by weak references.
+@dataclass(frozen=True, eq=False)
 class DeviceTexture:
     """One texture on the device.
 

@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from gen_data.core import asset_types, interfaces, mapped_files
-from gen_data.core.bounded_cache import ByteCache, CountCache, ObjectCache
+from gen_data.core.bounded_cache import ByteCache, CountCache, HeldCache, ObjectCache
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.renderers.warp.scene import brdf_albedo_lut, device_assets, environment_maps
 from gen_data.renderers.warp.scene.distortion_lut import DeviceOptics, upload_optics
@@ -18,14 +18,15 @@ from gen_data.renderers.warp.scene.struct_dtypes import to_device
 _MESH_BYTES, _TEXTURE_BYTES = 88 << 20, 192 << 20
 """Of a GPU."""
 _OWN_MESH_BYTES, _OWN_TEXTURE_BYTES = 24 << 20, 8 << 20
-"""On the CPU, where most are views of files, whose pages the system can drop.
-
-There is as much for meshes and textures that are not stored, such as roads: their scene alone has
-them, and in one cache they would drive out all others."""
+"""On the CPU, where most are views of files, whose pages the system can drop."""
 _MESHES, _TEXTURES = 4096, 2048
 """Some kilobytes each in addition to their arrays, and up to two maps of files."""
-_ENVIRONMENT_BYTES = 32 << 20
+_ENVIRONMENT_BYTES, _ENVIRONMENTS = 16 << 20, 64
+"""Two of the skies that scenes draw; on the CPU, stored panoramas are views of files."""
 _OPTICS_BYTES = 192 << 20
+_FILE_BYTES = 16 << 20
+"""Pages of files that are read until all are dropped. They come back from the system's page cache,
+16 at a time, which takes no measurable time in streets."""
 _LENSES = 64
 """Capacity of the cache of lenses: a randomized one is new in every scene."""
 _SCRATCH_RESERVE = 8
@@ -90,17 +91,21 @@ class DeviceCache:
         texture_bytes = _OWN_TEXTURE_BYTES if device.is_cpu else _TEXTURE_BYTES
         self._meshes: ByteCache[device_assets.DeviceMesh] = ByteCache(mesh_bytes, _MESHES)
         self._textures: ByteCache[device_assets.DeviceTexture] = ByteCache(texture_bytes, _TEXTURES)
-        self._passing_meshes: ByteCache[device_assets.DeviceMesh] = ByteCache(mesh_bytes, _MESHES)
-        self._passing_textures: ByteCache[device_assets.DeviceTexture] = ByteCache(
-            texture_bytes, _TEXTURES
-        )
+        # Of assets that are not stored, such as roads: their scene alone has them, and in one cache
+        # they would drive out all others.
+        self._passing_meshes: HeldCache[device_assets.DeviceMesh] = HeldCache()
+        self._passing_textures: HeldCache[device_assets.DeviceTexture] = HeldCache()
         self._environments: ByteCache[environment_maps.DeviceEnvironment] = ByteCache(
-            _ENVIRONMENT_BYTES
+            _ENVIRONMENT_BYTES, _ENVIRONMENTS
         )
         self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES, _LENSES)
         self._scratch: dict[str, _Scratch] = {}
         self._constants: dict[tuple[object, ...], wp.array] = {}
         self._latest: dict[str, list[_Latest]] = {}
+
+    def limit_pages(self) -> None:
+        """Drop the pages of asset files if many were read; the next reader gets them again."""
+        self.pages.limit_growth(_FILE_BYTES)
 
     def keep_scenes(self, count: int) -> None:
         """Keep the packed data of that many of the latest scenes instead of one."""
@@ -140,8 +145,8 @@ class DeviceCache:
             )
             return device_assets.upload_texture(prepared, self.device)
 
-        cache = self._textures if self._lasts(texture_id) else self._passing_textures
-        return cache.get(texture_id, make)
+        lasts = self._lasts(texture_id)
+        return (self._textures if lasts else self._passing_textures).get(texture_id, make)
 
     def _lasts(self, asset_id: str) -> bool:
         """Whether an asset is one of those that scenes share."""

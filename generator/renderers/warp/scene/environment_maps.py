@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gen_data.core.asset_types import Float32
 from gen_data.core.colorimetry import luminance
+from gen_data.core.mapped_files import owned_bytes
 from gen_data.core.se3 import Array, Vec3
 from gen_data.renderers.warp.device import launch
 from gen_data.renderers.warp.scene.kernels.environment_lighting import prefilter, weigh_texels
@@ -209,6 +210,7 @@ class DeviceEnvironment:
 
     Attributes:
         lamps: Lamps that replace the parts missing from ``rest``.
+        nbytes: Bytes owned: on the CPU, without mapped files.
     """
 
     irradiance: wp.array
@@ -220,9 +222,14 @@ class DeviceEnvironment:
 
 
 def upload_environment(image: Float32, device: wp.Device) -> DeviceEnvironment:
-    """Upload an equirectangular image [h, 2h, 3] as light without shadows."""
-    shown = wp.array(image, dtype=wp.vec3, device=device)
-    return _upload(image, (), shown, shown)
+    """Upload an equirectangular image [h, 2h, 3] as light without shadows.
+
+    On the CPU, the environment refers to the image itself: it must not change.
+    """
+    image = np.ascontiguousarray(image, np.float32)
+    shown = wp.array(image, dtype=wp.vec3, device=device, copy=not device.is_cpu)
+    owned = owned_bytes(image) if device.is_cpu else image.nbytes
+    return _upload(image, (), shown, shown, owned)
 
 
 def upload_split(image: Float32, whole: DeviceEnvironment) -> DeviceEnvironment:
@@ -231,8 +238,9 @@ def upload_split(image: Float32, whole: DeviceEnvironment) -> DeviceEnvironment:
     rest, lamps = remove_peaks(light)
     if not lamps:
         return whole
-    mirrored = wp.array(_dim(image, light, rest), dtype=wp.vec3, device=whole.image.device)
-    return _upload(rest, lamps, whole.image, mirrored)
+    dimmed = _dim(image, light, rest)
+    mirrored = wp.array(dimmed, dtype=wp.vec3, device=whole.image.device)
+    return _upload(rest, lamps, whole.image, mirrored, dimmed.nbytes)
 
 
 def _dim(image: Float32, light: Float32, rest: Float32) -> Float32:
@@ -247,7 +255,7 @@ def _dim(image: Float32, light: Float32, rest: Float32) -> Float32:
 
 
 def _upload(
-    light: Float32, lamps: tuple[SkyLamp, ...], image: wp.array, rest: wp.array
+    light: Float32, lamps: tuple[SkyLamp, ...], image: wp.array, rest: wp.array, nbytes: int
 ) -> DeviceEnvironment:
     device = image.device
     sources = {height: _shrink(light, height) for height in {*_SOURCE_HEIGHTS}}
@@ -264,7 +272,7 @@ def _upload(
         image,
         rest,
         lamps,
-        maps.nbytes + 12 * int(rest.size),
+        maps.nbytes + nbytes,
     )
 
 

@@ -100,14 +100,9 @@ class _PackedScene:
     layered: bool
 
 
-_FILE_BYTES = 64 << 20
-"""Pages of files that frames may read until all are dropped: about as many as the views of a street
-share."""
-
-
 def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
     """Pack a scene for one camera. Cheap enough for every frame."""
-    cache.pages.limit_growth(_FILE_BYTES)
+    cache.limit_pages()
     packed: _PackedScene = cache.scenes.get(scene, lambda: _pack_scene(scene, cache))
     return _pack_for_camera(camera, packed, scene.weather, cache)
 
@@ -178,9 +173,11 @@ def _pack_bodies(bodies: tuple[Body, ...], cache: DeviceCache) -> _PackedScene:
     asset_ids = sorted({body.asset for body in bodies})
     place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
     meshes = [cache.mesh(asset_id) for asset_id in asset_ids]
+    cache.limit_pages()
     per_body = material_packing.body_materials(bodies, cache)
     texture_ids = sorted({texture_id for entry in per_body for texture_id in entry.textures})
     textures = {texture_id: cache.texture(texture_id) for texture_id in texture_ids}
+    cache.limit_pages()
     surfaces = material_packing.surface_records(per_body, textures)
     body_records = np.zeros(len(bodies), dtype=struct_dtype(records.BodyRecord))
     body_records["geometry"] = [place[body.asset] for body in bodies]
