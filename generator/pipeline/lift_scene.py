@@ -408,22 +408,28 @@ def _lifted_lane(
     points[:, 2] += height
     bank = lane.bank + float(rise.mean()) / across_m
     banks = lane.bank + rise / across_m
-    is_twisted = np.ptp(banks) > _TWIST
-    steps = np.diff(points, axis=0)
+    is_twisted = bool(banks.max() - banks.min() > _TWIST)
+    # Differences by slices: numpy's function takes longer than the few points of a lane.
+    steps = points[1:] - points[:-1]
     grades = steps[:, 2] / np.hypot(steps[:, 0], steps[:, 1])
-    turned = np.floor(np.concatenate([[0.0], np.cumsum(np.abs(np.diff(grades)))]) / _TURN)
-    given[1:-1] |= np.diff(turned) > 0.0
+    given[1:-1] |= _turns(grades)
     if is_twisted:
-        twisted = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(banks)))])
-        given[1:] |= np.diff(np.floor(twisted / _TURN)) > 0.0
+        given[1:] |= _turns(banks)
     center = [(x, y, z) for x, y, z in decimals.round_rows(points[given], 6)]
-    given_banks = np.round(banks[given], 9) + 0.0
     return replace(
         lane,
         center_m=tuple(center),
         bank=round(bank, 9) + 0.0,
-        banks=tuple(given_banks.tolist()) if is_twisted else (),
+        banks=tuple((np.round(banks[given], 9) + 0.0).tolist()) if is_twisted else (),
     )
+
+
+def _turns(slopes: Array) -> NDArray[np.bool_]:
+    """Where slopes [n] along a line have changed by another ``_TURN`` since its start, [n - 1]."""
+    turned = np.floor(np.cumsum(np.abs(slopes[1:] - slopes[:-1])) / _TURN)
+    changed: NDArray[np.bool_] = turned > 0.0
+    changed[1:] = turned[1:] > turned[:-1]
+    return changed
 
 
 def _refined(points: Array) -> tuple[Array, NDArray[np.bool_]]:
