@@ -26,7 +26,8 @@ def config_schema() -> dict[str, Any]:
             "type": "array",
             "items": {"oneOf": [INHERITED, *(_plugin(table, n, definitions) for n in table)]},
         }
-    properties["exporters"]["items"]["oneOf"].insert(1, {"enum": list(config.PLUGIN_LISTS["exporters"])})
+    names_of_exporters = {"enum": list(config.PLUGIN_LISTS["exporters"])}
+    properties["exporters"]["items"]["oneOf"].insert(1, names_of_exporters)
     properties["render"] = {
         "description": "How images are made.",
         "anyOf": [_plugin(RENDERERS, name, definitions) for name in RENDERERS],
