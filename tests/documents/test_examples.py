@@ -45,7 +45,7 @@ def test_both_loaders_give_the_same_batches(tmp_path: Path) -> None:
 
     assert finished == rendered
     assert len(finished) == 4
-    assert sorted(numbers[0] + numbers[1]) == sorted(numbers[2] + numbers[3]) == list(range(8))
+    assert sorted(numbers[0] + numbers[1]) == sorted(numbers[2] + numbers[3]) == list(range(1, 9))
     assert numbers[:2] != numbers[2:]
 
 
