@@ -170,11 +170,13 @@ class CameraPose(RandomizerBase):
         """Draw the share once: places that are taken change object and direction, not the share.
 
         Otherwise large shares of small objects, near others, would be rarer than declared. Only
-        where all places are taken, as in a compartment, the smallest declared share is tried.
+        where all places are taken, as in a compartment, the mean of the share and the smallest
+        declared one is tried, and then the smallest, as at the bottom of a bag.
         """
         assert self.fills is not None, "only framed cameras come here"
         seen = False
-        for share in (self.fills.draw(rng), self.fills.support()[0]):
+        drawn, smallest = self.fills.draw(rng), self.fills.support()[0]
+        for share in dict.fromkeys((drawn, 0.5 * (drawn + smallest), smallest)):
             for _ in range(TRIES):
                 thing = self._draw_thing(scene, assets, rng)
                 framing = self._draw_framing(share, camera, rng)

@@ -255,16 +255,17 @@ def test_aims_can_be_mixed_and_need_no_share() -> None:
 
 
 def test_small_shares_are_tried_only_where_the_drawn_one_has_no_place() -> None:
-    """A share of .9 or .2: with 0.4 m around the objects, the camera has a place at .2 only."""
+    """A share of .9 or .2: with more room around objects, only places at .55 or .2 are free."""
     either = Choice({0.9: 1.0, 0.2: 1e-9})
     sides = {}
-    for clearance_m in (0.0, 0.4):
+    for clearance_m in (0.0, 0.25, 0.4):
         camera = framed(fills=either, off_center=Constant(0.0), clearance_m=clearance_m)
         T = camera.T_world_camera.inverse()
         corners = [LENSES["pinhole"].project(T.apply(corners_of(b))) for b in SCENE.bodies[1:]]
         ahead = [c for c in corners if np.isfinite(c).all()]
         sides[clearance_m] = [float(np.ptp(c, axis=0).max()) / 640 for c in ahead]
     assert min(abs(side - 0.9) for side in sides[0.0]) < 0.02
+    assert min(abs(side - 0.55) for side in sides[0.25]) < 0.02
     assert min(abs(side - 0.2) for side in sides[0.4]) < 0.02
 
 
