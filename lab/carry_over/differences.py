@@ -102,7 +102,7 @@ def compare(
         units_ours: Number of our units.
 
     Returns:
-        Rows, the largest difference first; classes with rows of too few values; and quantities
+        Rows, the largest difference beyond chance first; classes with too few values; quantities
         that one side alone states.
     """
     every = {**real, **ours}
@@ -117,7 +117,7 @@ def compare(
         _row(key, real[key].values, ours[key].values, float(a), float(c))
         for key, a, c in zip(keys, apart, chance, strict=True)
     ]
-    ordered = sorted(rows, key=lambda row: (not row.differs, -row.apart))
+    ordered = sorted(rows, key=lambda row: (not row.differs, row.chance - row.apart))
     return tuple(ordered), tuple(few), tuple(sorted(one_sided))
 
 
