@@ -9,7 +9,7 @@ import numpy as np
 from gen_data.content.procedural.patches import Array, Patch
 from gen_data.content.roads import lane_textures, painted_signs, road_materials
 from gen_data.roads.cross_section import RoadShape
-from gen_data.roads.reference_line import ReferenceLine
+from gen_data.roads.reference_line import ReferenceLine, beside
 
 PAINT_LIFT_M = 0.003
 SAGITTA_M = 0.008
@@ -43,23 +43,20 @@ class Deck:
 
     def at(self, s_m: Array, t_m: Array, lift_m: float = 0.0) -> Array:
         """Points [..., 3] on the surface, or over it."""
-        x, y, heading = self._poses(s_m)
         points = np.zeros((*s_m.shape, 3))
-        points[..., 0] = x - t_m * np.sin(heading)
-        points[..., 1] = y + t_m * np.cos(heading)
+        points[..., :2] = beside(self._poses(s_m), t_m)
         points[..., 2] = np.interp(t_m, self.t_m, self.z_m) + lift_m
         return points
 
     def _poses(self, s_m: Array) -> Array:
-        """``x, y, heading`` of the line, shape [3, ...]; strips share their rows."""
+        """Poses of the line, [..., 3], or of the rows of a grid, [n, 1, 3], which strips share."""
         is_grid = s_m.ndim == 2 and bool((s_m == s_m[:, :1]).all())
         rows = s_m[:, 0] if is_grid else s_m.ravel()
         key = rows.tobytes()
         if key not in self._known:
             self._known[key] = self.line.poses(rows)
         columns = (len(rows), 1) if is_grid else s_m.shape
-        poses: Array = self._known[key].T.reshape(3, *columns)
-        return poses
+        return self._known[key].reshape(*columns, 3)
 
     def rows(self, start_m: float, end_m: float) -> Array:
         """Arc lengths from start to end with the common rows between them."""

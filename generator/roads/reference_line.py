@@ -165,9 +165,9 @@ class ReferenceLine:
 
 
 def beside(poses: Array, t_m: Array) -> Array:
-    """Points [n, 2] at distances [n] to the left of poses [n, 3]."""
-    x, y, heading = poses.T
-    return np.stack([x - t_m * np.sin(heading), y + t_m * np.cos(heading)], axis=1)
+    """Points [..., 2] at distances [...] to the left of poses [..., 3], which may be broadcast."""
+    x, y, heading = np.moveaxis(poses, -1, 0)
+    return np.stack([x - t_m * np.sin(heading), y + t_m * np.cos(heading)], axis=-1)
 
 
 def cubic(coefficients: Sequence[float], x: Array) -> Array:
