@@ -38,7 +38,7 @@ def network_solid(network: Network) -> Solid:
 
 
 def _strips(road: Road, section: Section, slots: dict[str, int]) -> Iterator[Patch]:
-    s = stations(section.start_m, section.end_m, _STEP_M)
+    s = road.stations(section.start_m, section.end_m, _STEP_M)
     edges = road.boundaries_m(section, s)
     for side in (1, -1):
         below = np.zeros(len(s))
@@ -91,7 +91,7 @@ def _marks(road: Road, section: Section, slot: int) -> Iterator[Patch]:
             if mark.kind in ("none", "curb", "grass", "edge", "custom") or road.junction:
                 continue
             broken = mark.kind.startswith("broken")
-            whole = (stations(start, end, _STEP_M),)
+            whole = (road.stations(start, end, _STEP_M),)
             for s in _dashes(section.origin_m, start, end) if broken else whole:
                 t = road.boundaries_m(section, s)[number]
                 lift = np.full(len(s), deck.PAINT_LIFT_M + heights_m(lane)[1] * (number != 0))

@@ -17,6 +17,7 @@ import numpy as np
 
 from gen_data.core.errors import AssetError
 from gen_data.core.safe_xml import parse_xml
+from gen_data.roads.lane_graph import stations
 from gen_data.roads.opendrive_unused import count_unused
 from gen_data.roads.reference_line import (
     Arc,
@@ -43,6 +44,8 @@ _MAX_TURN_RAD = 100.0
 _MAX_POLY3_M, _MAX_SLOPE = 1_000.0, 100.0
 _MAX_LANE_WIDTH_M, _MAX_REACH_M = 100.0, 1e4
 _CHECK_STEP_M = 10.0
+_STATION_GAP_M = 0.05
+"""Least distance of stations where records begin."""
 NEGATIVE_M = 0.1
 """Widths down to minus this one are read as 0: cubics overshoot where lanes end."""
 
@@ -260,6 +263,23 @@ class Road:
                 inner = edges[min(level, key=abs) - side]
                 t_m = np.minimum(t_m, inner) if side > 0 else np.maximum(t_m, inner)
         return t_m
+
+    def stations(self, start_m: float, end_m: float, step_m: float) -> Array:
+        """Arc lengths [n] at most a step apart, with those where a record of the file begins."""
+        even = stations(start_m, end_m, step_m)
+        pieces = [self.elevation_m, self.superelevation_rad, *self.crossfall_rad]
+        begins = {piece[0] for one in (*pieces, self.lane_offset_m) for piece in one.pieces}
+        begins |= {s for s, _ in self.shape_m.stations}
+        for section in self.sections:
+            here = section.start_m < end_m and section.end_m > start_m
+            for lane in section.lanes.values() if here else ():
+                record = lane.border_m or lane.width_m
+                begins |= {section.origin_m + piece[0] for piece in record.pieces}
+        made = even
+        for s_m in sorted(begins):
+            if start_m < s_m < end_m and np.abs(made - s_m).min() > _STATION_GAP_M:
+                made = np.sort(np.append(made, s_m))
+        return made
 
     def speed_m_s(self, section: Section, number: int) -> float:
         """Speed limit of a lane in a section; 0 = not given."""

@@ -10,6 +10,7 @@ from gen_data.assets.checking import check_folder
 from gen_data.assets.library import open_library
 from gen_data.content.roads.network_surface import network_solid
 from gen_data.core.errors import AssetError
+from gen_data.core.lane_geometry import border_line
 from gen_data.core.scene import Lane
 from gen_data.roads.opendrive import read_opendrive
 from gen_data.roads.opendrive_lanes import network_lanes
@@ -374,3 +375,46 @@ def test_sidewalks_that_meet_head_on_lead_nowhere() -> None:
     found = lanes(road(right=walk, link=link), corner)
     assert found["1.0.-1"].center_m[-1] == found["2.0.1"].center_m[-1]
     assert found["1.0.-1"].successors == ()
+
+
+@pytest.mark.parametrize("rule", ["RHT", "LHT"])
+def test_borders_follow_lanes_that_widen_shift_and_twist(rule: str) -> None:
+    """Closed forms of the file: a taper beside an offset, on a superelevation that grows.
+
+    At s the offset is 0.02 s, the width 1 + 0.02 s, and the slope of the road tan(0.0005 s).
+    """
+    wide = '<width sOffset="0" a="1" b="0.02" c="0" d="0"/>'
+    twist = '<superelevation s="0" a="0" b="0.0005" c="0" d="0"/>'
+    made = road(lane(1), lane(-1, wide) + lane(-2), twist)
+    made = made.replace("<lanes>", '<lanes><laneOffset s="0" a="0" b="0.02" c="0" d="0"/>')
+    named = lanes(made.replace("<road ", f'<road rule="{rule}" '))
+    for name, is_upper, slope, middle_m in (
+        ("1.0.1", True, 0.02, 3.5),
+        ("1.0.1", False, 0.02, 0.0),
+        ("1.0.-1", True, 0.02, 0.0),
+        ("1.0.-1", False, 0.0, -1.0),
+        ("1.0.-2", True, 0.0, -1.0),
+        ("1.0.-2", False, 0.0, -4.5),
+    ):
+        one = named[name]
+        runs_east = one.center_m[0][0] < one.center_m[-1][0]
+        assert runs_east == ((name == "1.0.1") == (rule == "LHT"))
+        line = np.array(border_line(one, "left" if is_upper == runs_east else "right"))
+        s = line[:, 0] + 50.0
+        t = slope * s + middle_m
+        assert line[:, 1] == pytest.approx(t, abs=2e-3)
+        assert line[:, 2] == pytest.approx(t * np.tan(0.0005 * s), abs=2e-3)
+
+
+def test_borders_and_surface_bend_where_a_record_begins() -> None:
+    """A lane of 3 m widens from 33.1 m on by 0.1 per metre, to 5 m at 53.1 m."""
+    records = ((0, 3, 0), (33.1, 3, 0.1), (53.1, 5, 0))
+    widths = "".join(f'<width sOffset="{s}" a="{a}" b="{b}" c="0" d="0"/>' for s, a, b in records)
+    made = road(right=lane(-1, widths + SOLID))
+    line = np.array(border_line(lanes(made)["1.0.-1"], "right"))
+
+    outer_m = np.interp(line[:, 0] + 50.0, [33.1, 53.1], [-3.0, -5.0])
+    assert line[:, 1] == pytest.approx(outer_m, abs=0.01)
+    asphalt = network_solid(read_opendrive(text(made), "a.xodr")).mesh.vertices_m[:, :2]
+    corners = np.round(asphalt.astype(float), 4).tolist()
+    assert {(-16.9, -3.0), (3.1, -5.0)} <= set(map(tuple, corners))
