@@ -125,16 +125,31 @@ def _profile(pieces: tuple[tuple[float, ...], ...], t_m: Array) -> Array:
     return heights
 
 
+LINE_WORDS = frozenset({"solid", "broken"})
+"""Words of the kinds of marks that are painted."""
+
+
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A line on the outer edge of a lane.
+    """One or two lines on the outer edge of a lane.
 
     Attributes:
-        kind: ``solid``, ``broken``, ``none``, ... as in the file.
+        kind: ``solid``, ``broken solid``, ``none``, ... as in the file.
+        width_m: Of each line.
     """
 
     kind: str
     width_m: float
+    is_yellow: bool = False
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """``solid`` and ``broken`` lines, from the inside out; of lane 0 from left to right.
+
+        Empty = nothing is painted: kerbs, edges, dots.
+        """
+        words = tuple(self.kind.split())
+        return words if len(words) < 3 and LINE_WORDS.issuperset(words) else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -627,7 +642,8 @@ def _read_marks(lane: Element) -> Iterator[tuple[float, Mark]]:
     for element in lane.findall("roadMark"):
         offset = _read_number(element, "sOffset") if "sOffset" in element.attrib else 0.0
         width_m = float(element.get("width", "0.12")) or 0.12
-        yield offset, Mark(element.get("type", "none"), width_m)
+        is_yellow = element.get("color") == "yellow"
+        yield offset, Mark(element.get("type", "none"), width_m, is_yellow)
 
 
 def _read_piecewise(elements: Iterable[Element], start: str = "s") -> Piecewise:

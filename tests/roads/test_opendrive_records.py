@@ -51,13 +51,13 @@ def lanes(*roads: str, more: str = "") -> dict[str, Lane]:
     return {x.name: x for x in network_lanes(read_opendrive(text(*roads, more=more), "a.xodr"))}
 
 
-def painted_m(*roads: str, edge_m: float) -> list[tuple[float, float]]:
+def painted_m(*roads: str, edge_m: float, reach_m: float = 0.2) -> list[tuple[float, float]]:
     """From where to where along the road the line at ``y = edge_m`` is painted."""
     mesh = network_solid(read_opendrive(text(*roads), "a.xodr")).mesh
     slots = [k for k, material in enumerate(mesh.materials) if material.role == "marking"]
     faces = mesh.faces[np.isin(mesh.face_slots, slots)]
     corners = mesh.vertices_m[faces].astype(float)
-    corners = corners[np.abs(corners[..., 1] - edge_m).max(axis=1) < 0.2] + [50.0, 0.0, 0.0]
+    corners = corners[np.abs(corners[..., 1] - edge_m).max(axis=1) < reach_m] + [50.0, 0.0, 0.0]
     spans = sorted((c[:, 0].min(), c[:, 0].max()) for c in corners)
     merged: list[list[float]] = []
     for low, high in spans:
@@ -91,6 +91,59 @@ def test_marks_change_along_the_road(marks: str, spans: list[tuple[float, float]
     found = painted_m(road(right=lane(-1, WIDTH + marks)), edge_m=-3.5)
     assert len(found) == len(spans)
     np.testing.assert_allclose(np.ravel(found), np.ravel(spans), atol=2e-3)
+
+
+DASHES = [(3 + 9 * k, 6 + 9 * k) for k in range(11)]
+WHOLE = [(0, 100)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "upper", "lower"),
+    [
+        ("solid broken", -1, WHOLE, DASHES),
+        ("solid broken", 0, WHOLE, DASHES),
+        ("solid broken", 1, DASHES, WHOLE),
+        ("broken solid", -1, DASHES, WHOLE),
+        ("broken solid", 1, WHOLE, DASHES),
+        ("solid solid", 0, WHOLE, WHOLE),
+        ("broken broken", -1, DASHES, DASHES),
+        ("botts dots", -1, [], []),
+        ("edge", -1, [], []),
+    ],
+)
+def test_double_marks_are_listed_from_the_inside_out(
+    kind: str, number: int, upper: list[tuple[float, float]], lower: list[tuple[float, float]]
+) -> None:
+    """ASAM OpenDRIVE 1.6, 9.6: of the centre lane from left to right."""
+    mark = f'<roadMark sOffset="0" type="{kind}" width="0.12"/>'
+    sides = {n: WIDTH + mark * (n == number) for n in (1, -1)}
+    made = road(lane(1, sides[1]), lane(-1, sides[-1]), center=mark if number == 0 else "")
+    edge_m = 3.5 * number
+    for spans, aside_m in ((upper, 0.12), (lower, -0.12)):
+        found = painted_m(made, edge_m=edge_m + aside_m, reach_m=0.07)
+        assert len(found) == len(spans)
+        np.testing.assert_allclose(np.ravel(found), np.ravel(spans), atol=2e-3)
+
+
+@pytest.mark.parametrize(("color", "yellow"), [("yellow", True), ("white", False)])
+def test_paint_has_the_colour_of_the_file(color: str, yellow: bool) -> None:
+    mark = f'<roadMark sOffset="0" type="solid" width="0.12" color="{color}"/>'
+    mesh = network_solid(read_opendrive(text(road(right=lane(-1), center=mark)), "a.xodr")).mesh
+    painted = [mesh.materials[k] for k in np.unique(mesh.face_slots)]
+    (paint,) = [material for material in painted if material.role == "marking"]
+    red, _, blue = paint.base_color
+    assert (red > 2.0 * blue) == yellow
+
+
+def test_marks_that_are_painted_otherwise_are_named() -> None:
+    marks = "".join(
+        f'<roadMark sOffset="{k}" type="{kind}" color="{color}"/>'
+        for k, (kind, color) in enumerate([
+            ("solid", "standard"), ("botts dots", "white"), ("broken", "red"), ("curb", "white"),
+        ])
+    )  # fmt: skip
+    network = read_opendrive(text(road(right=lane(-1, WIDTH + marks))), "a.xodr")
+    assert network.unused == {"color='red' of roadMark": 1, "type='botts dots' of roadMark": 1}
 
 
 # --- speeds ---
