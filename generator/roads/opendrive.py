@@ -52,6 +52,8 @@ NEGATIVE_M = 0.1
 NO_LIMIT_M_S = 130.0 / 3.6
 """Speed on roads without a limit: the advisory one of German motorways."""
 
+_UNITS_M_S = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+
 Contact = Literal["start", "end"]
 V = TypeVar("V")
 Steps = tuple[tuple[float, V], ...]
@@ -678,8 +680,12 @@ def _read_speed(element: Element | None) -> float:
         return 0.0
     if text == "no limit":
         return NO_LIMIT_M_S
-    factor = {"km/h": 1 / 3.6, "mph": 0.44704}.get(element.get("unit", "m/s"), 1.0)
-    return float(text) * factor
+    unit = element.get("unit") or "m/s"
+    if unit not in _UNITS_M_S:
+        raise ValueError(
+            f"the unit '{unit[:40]}' of a speed is unknown; expected {', '.join(_UNITS_M_S)}"
+        )
+    return float(text) * _UNITS_M_S[unit]
 
 
 def _read_number(element: Element, name: str) -> float:

@@ -13,8 +13,8 @@ from gen_data.roads.lane_graph import FURNITURE_M, stations, world_points
 from gen_data.roads.opendrive import Contact, LaneRecord, Network, Road, Section
 from gen_data.roads.reference_line import Array
 
-_DRIVEN = ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "bidirectional",
-           "bus", "taxi")  # fmt: skip
+_DRIVEN = ("driving", "entry", "exit", "mwyEntry", "mwyExit", "onRamp", "offRamp", "slipLane",
+           "connectingRamp", "bidirectional", "bus", "taxi", "HOV")  # fmt: skip
 KINDS: dict[str, LaneKind] = {
     **dict.fromkeys(_DRIVEN, "driving"),
     "parking": "parking",

@@ -70,6 +70,9 @@ def _unused_attributes(element: Element) -> Iterator[str]:
         yield "singleSide='true' of laneSection"
     if element.tag == "junction" and element.get("type") == "virtual":
         yield "virtual junction"
+    elif element.tag == "junction":
+        ways = element.findall("connection")
+        yield from ["connection without laneLink" for way in ways if way.find("laneLink") is None]
     if element.tag == "roadMark":
         kind, color = element.get("type", "none"), element.get("color", "white")
         if kind not in _MARKS:

@@ -176,6 +176,39 @@ def test_a_lane_may_have_a_speed_of_its_own() -> None:
     assert kmh == {"1.0.-1": 50.0, "1.1.-1": 50.0, "1.0.-2": 30.0, "1.1.-2": 36.0}
 
 
+@pytest.mark.parametrize(
+    ("speed", "limit_m_s"),
+    [
+        ('max="15"', 15.0),
+        ('max="36" unit="km/h"', 10.0),
+        ('max="25" unit="mph"', 25 * 1609.344 / 3600),
+    ],
+)
+def test_speeds_have_the_units_of_the_standard(speed: str, limit_m_s: float) -> None:
+    town = f'<type s="0" type="town"><speed {speed}/></type>'
+    assert lanes(road(right=lane(-1), types=town))["1.0.-1"].speed_m_s == pytest.approx(limit_m_s)
+
+
+def test_an_unknown_unit_of_a_speed_is_refused() -> None:
+    """50 "kmh" were 50 m/s."""
+    town = '<type s="0" type="town"><speed max="50" unit="kmh"/></type>'
+    told = r"^a\.xodr: road '1': the unit 'kmh' of a speed is unknown; expected m/s, km/h, mph$"
+    with pytest.raises(AssetError, match=told):
+        lanes(road(right=lane(-1), types=town))
+
+
+@pytest.mark.parametrize("kind", ["mwyEntry", "mwyExit", "slipLane", "HOV"])
+def test_lanes_of_ramps_and_full_cars_are_driven(kind: str) -> None:
+    assert lanes(road(right=lane(-1, kind=kind)))["1.0.-1"].kind == "driving"
+
+
+def test_a_connection_without_lanes_is_named() -> None:
+    ways = '<junction id="9"><connection id="0" incomingRoad="1" connectingRoad="2"/></junction>'
+    network = read_opendrive(text(road(right=lane(-1)), road(right=lane(-1), number=2), more=ways),
+                             "a.xodr")  # fmt: skip
+    assert network.unused == {"connection without laneLink": 1}
+
+
 def test_a_type_without_a_change_of_speed_splits_nothing() -> None:
     same = TOWN + TOWN.replace('s="0"', 's="30"')
     assert set(lanes(road(right=lane(-1), types=same))) == {"1.0.-1", "1.0.-1/frontage"}
