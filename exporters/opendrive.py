@@ -22,8 +22,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
 from gen_data.exporters import base, fragments, image_files
 from gen_data.exporters.conventions import NO_CONVENTIONS, Conventions
 from gen_data.exporters.opendrive_xml import opendrive_bytes
@@ -39,6 +41,16 @@ class OpenDrive(StreetExporter):
     type: Literal["opendrive"] = "opendrive"
     conventions: ClassVar[Conventions] = NO_CONVENTIONS
     image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
+
+    def check_scene(self, scene: Scene) -> None:
+        """Reject scenes without a street, and lanes whose width changes."""
+        super().check_scene(scene)
+        for lane in scene.lanes:
+            if lane.widths_m:
+                raise ConfigError(
+                    f"exporter '{self.type}': lane '{lane.name}' changes its width, which is not "
+                    "written; leave the exporter out, the file of the road network has the lane"
+                )
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the file of each world of the shard, and a line per sample.

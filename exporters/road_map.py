@@ -15,7 +15,7 @@ from gen_data.assets.asset_ids import parse_asset_id
 from gen_data.assets.drape import split_draped
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo
-from gen_data.core.lane_geometry import LaneBorder, border_line, lane_borders
+from gen_data.core.lane_geometry import LaneBorder, border_line, half_widths_m, lane_borders
 from gen_data.core.scene import Body, Lane, Scene
 from gen_data.core.se3 import Array, Vec3
 from gen_data.exporters import base
@@ -436,7 +436,7 @@ def _stop_line(block: Block, driving: Sequence[Lane], paint: PaintIndex) -> Stop
             continue
         (x0, y0, _), (x1, y1, _) = lane.center_m[-2:]
         ahead = np.array([x1 - x0, y1 - y0]) / np.hypot(x1 - x0, y1 - y0)
-        left, half_m = np.array([-ahead[1], ahead[0]]), 0.5 * lane.width_m
+        left, half_m = np.array([-ahead[1], ahead[0]]), half_widths_m(lane)[-1]
         corners = [(-STOP_FROM_M, -half_m), (STOP_TO_M, -half_m), (STOP_TO_M, half_m),
                    (-STOP_FROM_M, half_m)]  # fmt: skip
         end = np.array([x1, y1])

@@ -174,7 +174,7 @@ class LaneObjects(GroupRandomizer):
             for _ in range(PER_LANE_MAX):
                 asset, scale, bounds_m, solid_m = run.thing
                 length_m, width_m = _extent_m(bounds_m, group.facing)
-                room_m = max(0.0, 0.5 * (line.lane.width_m - width_m))
+                room_m = max(0.0, line.half_width_m(at_m + 0.5 * length_m) - 0.5 * width_m)
                 left_m = room_m * self.lateral.draw(rng)
                 behind_m = self.behind_m.draw(rng)
                 turn = math.radians(self.yaw_deg.draw(rng))

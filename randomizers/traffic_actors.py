@@ -101,7 +101,7 @@ def find_drivers(scene: Scene, graph: LaneGraph, assets: interfaces.AssetIndex) 
         axles = find_axles(assets, body.asset, body.scale)
         T_world_rear = body.T_world_body @ axles.T_body_rear
         place = graph.nearest(*T_world_rear.translation_m[:2])
-        if place is None or place.away_m > 0.5 * graph.lines[place.lane].lane.width_m:
+        if place is None or place.away_m > graph.lines[place.lane].half_width_m(place.at_m):
             continue
         (ax, ay), (bx, by) = heading_direction(body), _lane_direction(graph, place)
         if ax * bx + ay * by > 0.7:
@@ -126,7 +126,7 @@ def find_pedestrians(
             (place.away_m, place)
             for graph in (crosswalks, sidewalks)
             if (place := graph.nearest(*xy)) is not None
-            and place.away_m < 0.5 * graph.lines[place.lane].lane.width_m
+            and place.away_m < graph.lines[place.lane].half_width_m(place.at_m)
         ]
         if near:
             place = min(near, key=lambda pair: pair[0])[1]

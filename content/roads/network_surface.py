@@ -22,7 +22,7 @@ def network_solid(network: Network) -> Solid:
 
     Slots as in ``street_materials``; the origin is ``origin_m``.
     """
-    look = road_materials.StreetLook()
+    look = road_materials.StreetLook(center_color="yellow")
     slots = road_materials.number_slots(look)
     x, y = origin_m(network)
     patches: list[Patch] = []
@@ -32,13 +32,13 @@ def network_solid(network: Network) -> Solid:
             patches += (p.moved(-x, -y) for p in _strips(road, section, slots))
             if section.start_m == section.origin_m:
                 # Parts of a section of the file have the same marks.
-                patches += (p.moved(-x, -y) for p in _marks(road, section, slots["marking"]))
+                patches += (p.moved(-x, -y) for p in _marks(road, section, slots))
             hulls += (hull - np.array([x, y, 0.0]) for hull in _hulls(road, section))
     return road_materials.make_street_solid(patches, look, hulls)
 
 
 def _strips(road: Road, section: Section, slots: dict[str, int]) -> Iterator[Patch]:
-    s = stations(section.start_m, section.end_m, _STEP_M)
+    s = road.stations(section.start_m, section.end_m, _STEP_M)
     edges = road.boundaries_m(section, s)
     for side in (1, -1):
         below = np.zeros(len(s))
@@ -85,20 +85,22 @@ class _Band:
         return deck.surface(points, plan, slot, self.slots[slot])
 
 
-def _marks(road: Road, section: Section, slot: int) -> Iterator[Patch]:
+def _marks(road: Road, section: Section, slots: dict[str, int]) -> Iterator[Patch]:
     for number, lane in section.lanes.items():
         for start, end, mark in section.mark_spans(lane):
-            if mark.kind in ("none", "curb", "grass", "edge", "custom") or road.junction:
-                continue
-            broken = mark.kind.startswith("broken")
-            whole = (stations(start, end, _STEP_M),)
-            for s in _dashes(section.origin_m, start, end) if broken else whole:
-                t = road.boundaries_m(section, s)[number]
-                lift = np.full(len(s), deck.PAINT_LIFT_M + heights_m(lane)[1] * (number != 0))
-                half = 0.5 * mark.width_m
-                sides = [road.points(section, s, t + k * half, lift) for k in (-1, 1)]
-                plan = np.stack([np.stack([s, t + k * half], 1) for k in (-1, 1)], axis=1)
-                yield deck.surface(np.stack(sides, 1), plan, "marking", slot)
+            for k, word in enumerate(() if road.junction else mark.lines):
+                # Lines are listed from the inside out, those of the centre from the left.
+                first_m = mark.width_m * (len(mark.lines) - 1) * (-1 if number > 0 else 1)
+                aside_m = first_m if k == 0 else -first_m
+                whole = (road.stations(start, end, _STEP_M),)
+                for s in _dashes(section.origin_m, start, end) if word == "broken" else whole:
+                    t = road.boundaries_m(section, s)[number] + aside_m
+                    lift = np.full(len(s), deck.PAINT_LIFT_M + heights_m(lane)[1] * (number != 0))
+                    half = 0.5 * mark.width_m
+                    sides = [road.points(section, s, t + i * half, lift) for i in (-1, 1)]
+                    plan = np.stack([np.stack([s, t + i * half], 1) for i in (-1, 1)], axis=1)
+                    slot = slots["center" if mark.is_yellow else "marking"]
+                    yield deck.surface(np.stack(sides, 1), plan, "marking", slot)
 
 
 def _dashes(origin_m: float, start_m: float, end_m: float) -> Iterator[Array]:

@@ -42,6 +42,12 @@ class LaneLine:
         """Length of the lane."""
         return self.at_m[-1]
 
+    def half_width_m(self, at_m: float) -> float:
+        """Half of the lane's width at an arc length, clamped to the lane."""
+        if not self.lane.widths_m:
+            return 0.5 * self.lane.width_m
+        return 0.5 * float(np.interp(at_m, self.at_m, self.lane.widths_m))
+
     def pose(self, at_m: float, left_m: float = 0.0) -> SE3:
         """``T_world_place``: on the ground, X in the direction of travel, Z up.
 
@@ -129,10 +135,15 @@ def border_line(lane: Lane, side: Side) -> tuple[Vec3, ...]:
     """The points of one side of a lane, as many as its centre line has."""
     sign = 1.0 if side == "left" else -1.0
     center = np.asarray(lane.center_m, dtype=np.float64)
-    half_m = 0.5 * lane.width_m * sign
-    points = center + half_m * left_normals(center)
+    half_m = sign * half_widths_m(lane)
+    points = center + half_m[:, None] * left_normals(center)
     points[:, 2] += half_m * np.asarray(lane.banks or lane.bank)
     return tuple((x, y, z) for x, y, z in (np.round(points, 6) + 0.0).tolist())
+
+
+def half_widths_m(lane: Lane) -> Array:
+    """Half of a lane's width at each of its points [n]."""
+    return np.broadcast_to(0.5 * np.asarray(lane.widths_m or lane.width_m), len(lane.center_m))
 
 
 def left_normals(line_m: Array) -> Array:

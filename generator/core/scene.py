@@ -166,7 +166,7 @@ class Lane:
             houses, ``frontage`` for the line of house fronts, with the street on its left.
         center_m: Points of the centre line, world, in the direction of travel, at most 2 m apart
             in bends; Z is the height of the ground.
-        width_m: Across the centre line.
+        width_m: Across the centre line; the mean where it changes along the lane.
         road: Name of the template element it belongs to.
         successors: Names of the lanes that continue at its end.
         left, right: Names of the adjacent lanes of the same direction; empty = none.
@@ -174,6 +174,7 @@ class Lane:
         junction: Whether it crosses a junction, where nothing may stop.
         bank: Rise from its right to its left side, per metre of width.
         banks: The same at each point, where it changes along the lane; empty = ``bank``.
+        widths_m: Width at each point, where it changes along the lane; empty = ``width_m``.
     """
 
     name: str
@@ -188,6 +189,7 @@ class Lane:
     junction: bool = False
     bank: float = 0.0
     banks: tuple[float, ...] = ()
+    widths_m: tuple[float, ...] = field(default=(), metadata={serialization.SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ import numpy as np
 
 from gen_data.core.errors import AssetError
 from gen_data.core.safe_xml import parse_xml
+from gen_data.roads.lane_graph import stations
 from gen_data.roads.opendrive_unused import count_unused
 from gen_data.roads.reference_line import (
     Arc,
@@ -43,11 +44,15 @@ _MAX_TURN_RAD = 100.0
 _MAX_POLY3_M, _MAX_SLOPE = 1_000.0, 100.0
 _MAX_LANE_WIDTH_M, _MAX_REACH_M = 100.0, 1e4
 _CHECK_STEP_M = 10.0
+_STATION_GAP_M = 0.05
+"""Least distance of stations where records begin."""
 NEGATIVE_M = 0.1
 """Widths down to minus this one are read as 0: cubics overshoot where lanes end."""
 
 NO_LIMIT_M_S = 130.0 / 3.6
 """Speed on roads without a limit: the advisory one of German motorways."""
+
+_UNITS_M_S = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 
 Contact = Literal["start", "end"]
 V = TypeVar("V")
@@ -122,16 +127,31 @@ def _profile(pieces: tuple[tuple[float, ...], ...], t_m: Array) -> Array:
     return heights
 
 
+LINE_WORDS = frozenset({"solid", "broken"})
+"""Words of the kinds of marks that are painted."""
+
+
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A line on the outer edge of a lane.
+    """One or two lines on the outer edge of a lane.
 
     Attributes:
-        kind: ``solid``, ``broken``, ``none``, ... as in the file.
+        kind: ``solid``, ``broken solid``, ``none``, ... as in the file.
+        width_m: Of each line.
     """
 
     kind: str
     width_m: float
+    is_yellow: bool = False
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """``solid`` and ``broken`` lines, from the inside out; of lane 0 from left to right.
+
+        Empty = nothing is painted: kerbs, edges, dots.
+        """
+        words = tuple(self.kind.split())
+        return words if len(words) < 3 and LINE_WORDS.issuperset(words) else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +280,23 @@ class Road:
                 inner = edges[min(level, key=abs) - side]
                 t_m = np.minimum(t_m, inner) if side > 0 else np.maximum(t_m, inner)
         return t_m
+
+    def stations(self, start_m: float, end_m: float, step_m: float) -> Array:
+        """Arc lengths [n] at most a step apart, with those where a record of the file begins."""
+        even = stations(start_m, end_m, step_m)
+        pieces = [self.elevation_m, self.superelevation_rad, *self.crossfall_rad]
+        begins = {piece[0] for one in (*pieces, self.lane_offset_m) for piece in one.pieces}
+        begins |= {s for s, _ in self.shape_m.stations}
+        for section in self.sections:
+            here = section.start_m < end_m and section.end_m > start_m
+            for lane in section.lanes.values() if here else ():
+                record = lane.border_m or lane.width_m
+                begins |= {section.origin_m + piece[0] for piece in record.pieces}
+        made = even
+        for s_m in sorted(begins):
+            if start_m < s_m < end_m and np.abs(made - s_m).min() > _STATION_GAP_M:
+                made = np.sort(np.append(made, s_m))
+        return made
 
     def speed_m_s(self, section: Section, number: int) -> float:
         """Speed limit of a lane in a section; 0 = not given."""
@@ -607,7 +644,8 @@ def _read_marks(lane: Element) -> Iterator[tuple[float, Mark]]:
     for element in lane.findall("roadMark"):
         offset = _read_number(element, "sOffset") if "sOffset" in element.attrib else 0.0
         width_m = float(element.get("width", "0.12")) or 0.12
-        yield offset, Mark(element.get("type", "none"), width_m)
+        is_yellow = element.get("color") == "yellow"
+        yield offset, Mark(element.get("type", "none"), width_m, is_yellow)
 
 
 def _read_piecewise(elements: Iterable[Element], start: str = "s") -> Piecewise:
@@ -642,8 +680,12 @@ def _read_speed(element: Element | None) -> float:
         return 0.0
     if text == "no limit":
         return NO_LIMIT_M_S
-    factor = {"km/h": 1 / 3.6, "mph": 0.44704}.get(element.get("unit", "m/s"), 1.0)
-    return float(text) * factor
+    unit = element.get("unit") or "m/s"
+    if unit not in _UNITS_M_S:
+        raise ValueError(
+            f"the unit '{unit[:40]}' of a speed is unknown; expected {', '.join(_UNITS_M_S)}"
+        )
+    return float(text) * _UNITS_M_S[unit]
 
 
 def _read_number(element: Element, name: str) -> float:

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gen_data.core import errors, se3
+from gen_data.core.lane_geometry import left_normals
 from gen_data.core.scene import Lane, LaneKind
 from gen_data.roads.lane_graph import FURNITURE_M, stations, world_points
 from gen_data.roads.opendrive import Contact, LaneRecord, Network, Road, Section
 from gen_data.roads.reference_line import Array
 
-_DRIVEN = ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "bidirectional",
-           "bus", "taxi")  # fmt: skip
+_DRIVEN = ("driving", "entry", "exit", "mwyEntry", "mwyExit", "onRamp", "offRamp", "slipLane",
+           "connectingRamp", "bidirectional", "bus", "taxi", "HOV")  # fmt: skip
 KINDS: dict[str, LaneKind] = {
     **dict.fromkeys(_DRIVEN, "driving"),
     "parking": "parking",
@@ -30,6 +31,10 @@ TAPERED_M = 0.5
 """Width below which a lane has ended where another one continues."""
 DEFAULT_SPEED_M_S = 13.9
 _STEP_M = 2.0
+_TWIST, _WIDENING_M = 1e-3, 1e-3
+"""Cross slopes, and widths, of a lane that change by less than this are one."""
+_NARROW_M = 0.05
+"""Width from which on a lane has a cross slope of its own: heights are rounded."""
 _SIGN_KINDS = frozenset({"sidewalk", "parking"})
 """Kinds that always run with the street on their left, whichever side traffic keeps to."""
 
@@ -109,7 +114,7 @@ class _LaneEdges:
 
 
 def _trace_edges(road: Road, section: Section, number: int, step_m: float = _STEP_M) -> _LaneEdges:
-    s = stations(section.start_m, section.end_m, step_m)
+    s = road.stations(section.start_m, section.end_m, step_m)
     edges = road.boundaries_m(section, s)
     side = 1 if number > 0 else -1
     return _LaneEdges(s, edges[number - side], edges[number])
@@ -121,15 +126,22 @@ def _make_lane(road: Road, index: int, section: Section, number: int, T_body_fil
     lift = np.full(len(course.s_m), 0.5 * sum(heights_m(record)))
     points = road.points(section, course.s_m, 0.5 * (course.inner_m + course.outer_m), lift)
     low_m, high_m = heights_m(record)
-    inner = road.points(section, course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2].mean()
-    outer = road.points(section, course.s_m, course.outer_m, np.full(len(lift), high_m))[
-        :, 2
-    ].mean()
-    width_m = round(float(np.abs(course.outer_m - course.inner_m).mean()), 6)
+    inner = road.points(section, course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2]
+    outer = road.points(section, course.s_m, course.outer_m, np.full(len(lift), high_m))[:, 2]
+    widths_m = np.abs(course.outer_m - course.inner_m)
     # Lanes with negative numbers have their inner edge on the left, seen along the road.
-    bank = float(inner - outer) / width_m * (1.0 if number < 0 else -1.0) if width_m else 0.0
-    if not runs_forward(road, record):
-        points, bank = points[::-1], -bank
+    forward = runs_forward(road, record)
+    fall = (inner - outer) * (1.0 if (number < 0) == forward else -1.0)
+    width_m = round(float(widths_m.mean()), 6)
+    bank = float(fall.mean()) / width_m if width_m else 0.0
+    banks = fall / np.maximum(widths_m, _NARROW_M)
+    # Widths of the file are square to the reference line, which the lane may leave at an angle.
+    normals = left_normals(points)[:, :2]
+    headings = road.line.poses(course.s_m)[:, 2]
+    across = np.stack([-np.sin(headings), np.cos(headings)], axis=1)
+    widths_m = widths_m * np.abs((normals * across).sum(axis=1))
+    if not forward:
+        points, banks, widths_m = points[::-1], banks[::-1], widths_m[::-1]
     kind = KINDS[record.kind]
     drives = kind == "driving"
     return Lane(
@@ -141,7 +153,16 @@ def _make_lane(road: Road, index: int, section: Section, number: int, T_body_fil
         speed_m_s=(road.speed_m_s(section, number) or DEFAULT_SPEED_M_S) if drives else 0.0,
         junction=bool(road.junction),
         bank=round(bank, 9) + 0.0,
+        banks=_where_it_changes(banks, _TWIST),
+        widths_m=_where_it_changes(widths_m, _WIDENING_M),
     )
+
+
+def _where_it_changes(values: Array, least: float) -> tuple[float, ...]:
+    """Values that differ by more than the least change; else none."""
+    if np.ptp(values) <= least:
+        return ()
+    return tuple((np.round(values, 9) + 0.0).tolist())
 
 
 def _make_side_lanes(road: Road, index: int, section: Section, T_body_file: se3.SE3) -> list[Lane]:

@@ -27,6 +27,13 @@ _GROUPS = frozenset({"objects", "signals", "railroad", "surface"})
 _REMARKS = frozenset({"userData", "dataQuality", "vectorScene"})
 """Remarks of programs, which are not part of the roads."""
 
+_MARKS = frozenset({
+    "none", "solid", "broken", "solid solid", "solid broken", "broken solid", "broken broken",
+    "curb", "edge", "grass",
+})  # fmt: skip
+"""Kinds of marks that are painted, or that nothing is painted for."""
+_COLORS = frozenset({"standard", "white", "yellow"})
+
 
 def count_unused(root: Element) -> dict[str, int]:
     """Names of the elements without effect, with their number, sorted by name."""
@@ -63,5 +70,14 @@ def _unused_attributes(element: Element) -> Iterator[str]:
         yield "singleSide='true' of laneSection"
     if element.tag == "junction" and element.get("type") == "virtual":
         yield "virtual junction"
+    elif element.tag == "junction":
+        ways = element.findall("connection")
+        yield from ["connection without laneLink" for way in ways if way.find("laneLink") is None]
+    if element.tag == "roadMark":
+        kind, color = element.get("type", "none"), element.get("color", "white")
+        if kind not in _MARKS:
+            yield f"type='{kind}' of roadMark"
+        if color not in _COLORS:
+            yield f"color='{color}' of roadMark"
     if element.tag in _LINKS and "elementS" in element.attrib:
         yield "link into a road (elementS)"

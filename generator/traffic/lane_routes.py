@@ -191,7 +191,7 @@ def _find_lane(graph: LaneGraph, stop: str | tuple[float, float], where: str) ->
     place = graph.nearest(*stop)
     if place is None:
         raise errors.ConfigError(f"{where}: the scene has no driving lanes")
-    if place.away_m > 0.5 * graph.lines[place.lane].lane.width_m:
+    if place.away_m > graph.lines[place.lane].half_width_m(place.at_m):
         raise errors.ConfigError(
             f"{where}: the route leaves the road: ({stop[0]:g}, {stop[1]:g}) is "
             f"{place.away_m:.1f} m from the middle of the nearest driving lane, '{place.lane}'; "

@@ -75,6 +75,11 @@ def read_coco(path: Path) -> CocoLabels:
         content = json.loads(path.read_bytes())
         names = {row["id"]: str(row["name"]) for row in content["categories"]}
         objects: dict[Any, list[RealObject]] = {row["id"]: [] for row in content["images"]}
+        for kind, name in (("images", "file_name"), ("categories", "name")):
+            rows = {(row["id"], row.get(name)) for row in content[kind]}
+            if len(rows) > len({number for number, _ in rows}):
+                raise ValueError(f"{kind} share an id; expected one each")
+        is_level = any(_number(row.get("occlusion")) > 1.0 for row in content["annotations"])
         empty = 0
         for row in content["annotations"]:
             x, y, width, height = map(float, row["bbox"])
@@ -86,8 +91,8 @@ def read_coco(path: Path) -> CocoLabels:
                     names[row["category_id"]],
                     (x, y, x + width, y + height),
                     bool(row.get("iscrowd", 0)),
-                    _occlusion(row.get("occlusion")),
-                    row.get("truncation"),
+                    _occlusion(row.get("occlusion"), is_level),
+                    _share(row.get("truncation")),
                 )
             )
         images = tuple(
@@ -115,7 +120,11 @@ def read_kitti(path: Path) -> tuple[RealObject, ...]:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, ValueError) as error:
         raise StorageError(f"{path}: not labels in KITTI's format: {error}") from error
-    return tuple(_kitti_object(f"{path}:{number}", line) for number, line in enumerate(lines, 1))
+    return tuple(
+        _kitti_object(f"{path}:{number}", line)
+        for number, line in enumerate(lines, 1)
+        if line.strip()
+    )
 
 
 def _kitti_object(place: str, line: str) -> RealObject:
@@ -162,6 +171,26 @@ def read_yolo_classes(path: Path) -> tuple[list[str], bool]:
         raise StorageError(f"{path}: no list of classes in YOLO's format: {error!r}") from error
 
 
+def yolo_images(path: Path) -> list[Path]:
+    """Folders, lists and images that ``data.yaml`` names as its splits, where they exist.
+
+    Names refer to its ``path``, or to its own folder where there is no such path.
+    """
+    if path.suffix not in (".yaml", ".yml"):
+        return []
+    content = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
+    base = path.parent / str(content.get("path") or "")
+    base = base if base.is_dir() else path.parent
+    found = []
+    for split in ("train", "val", "test"):
+        stated = content.get(split) or []
+        for name in [stated] if isinstance(stated, str) else stated:
+            # Roboflow writes ../train/images for train/images.
+            places = (base / str(name), base / str(name).removeprefix("../"))
+            found += list(filter(Path.exists, places))[:1]
+    return list(dict.fromkeys(found))
+
+
 def read_yolo(path: Path, names: Sequence[str], has_keypoints: bool) -> tuple[RealObject, ...]:
     """Read the labels of one image; boxes are in shares of its width and height.
 
@@ -176,7 +205,9 @@ def read_yolo(path: Path, names: Sequence[str], has_keypoints: bool) -> tuple[Re
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, ValueError) as error:
         raise StorageError(f"{path}: not labels in YOLO's format: {error}") from error
-    for number, line in enumerate(filter(str.strip, lines), 1):
+    for number, line in enumerate(lines, 1):
+        if not line.strip():
+            continue
         try:
             kind, *values = map(float, line.split())
             if len(values) == 4 or has_keypoints:
@@ -227,12 +258,30 @@ def _voc_object(item: ElementTree.Element) -> RealObject:
     )
 
 
-def _occlusion(value: Any) -> str:
-    """The level of a hidden fraction, by the bounds of ``gen_data.exporters.kitti``."""
+def _occlusion(value: Any, is_level: bool) -> str:
+    """The level of a hidden fraction, by the bounds of ``gen_data.exporters.kitti``.
+
+    Some data sets number levels, as KITTI does: their files have numbers above 1.
+    """
     if isinstance(value, str):
         return value if value in OCCLUSION_LEVELS else ""
-    if not isinstance(value, (int, float)):
+    if is_level:
+        number = _number(value)
+        return dict(enumerate(OCCLUSION_LEVELS)).get(int(number), "") if number % 1.0 == 0.0 else ""
+    share = _share(value)
+    if share is None:
         return ""
     from gen_data.exporters.kitti import occlusion_level
 
-    return OCCLUSION_LEVELS[occlusion_level(float(value))]
+    return OCCLUSION_LEVELS[occlusion_level(share)]
+
+
+def _number(value: Any) -> float:
+    """A number; -1 for anything else."""
+    return float(value) if isinstance(value, (int, float)) else -1.0
+
+
+def _share(value: Any) -> float | None:
+    """A number from 0 to 1; None = something else."""
+    number = _number(value)
+    return number if 0.0 <= number <= 1.0 else None

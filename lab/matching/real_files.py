@@ -5,6 +5,7 @@ of a camera (``depth``, ``instance``), are left out, and so are further links to
 """
 
 import math
+import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -81,9 +82,9 @@ def find_files(folder: Path) -> RealFiles:
         )
     seen: set[tuple[int, int]] = set()
     photos, scans, coco, kitti = [], [], [], []
-    for path in sorted(folder.rglob("*")):
+    for path in files_below(folder):
         inner = path.relative_to(folder).parts
-        if not path.is_file() or any(part.startswith(".") for part in inner):
+        if any(part.startswith(".") for part in inner):
             continue
         ending, parents = path.suffix.lower(), inner[:-1]
         status = path.stat()
@@ -105,6 +106,23 @@ def find_files(folder: Path) -> RealFiles:
         )
     instances = [path for path in coco if path.stem.startswith("instances")]
     return RealFiles(folder, tuple(photos), tuple(scans), tuple(instances or coco), tuple(kitti))
+
+
+def files_below(folder: Path) -> list[Path]:
+    """All files in a folder at any depth, sorted; links to folders are followed, each once."""
+    found: list[Path] = []
+    folders, links, walked = [folder], list[Path](), set[str]()
+    while folders or links:
+        place = folders.pop() if folders else links.pop()
+        if (real := os.path.realpath(place)) in walked:
+            continue
+        walked.add(real)
+        for path in sorted(place.iterdir(), reverse=True):
+            if path.is_dir():
+                (links if path.is_symlink() else folders).append(path)
+            elif path.is_file():
+                found.append(path)
+    return sorted(found)
 
 
 def choose_evenly(files: Sequence[T], limit: int) -> list[T]:

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +12,15 @@ from gen_data.core.asset_types import UInt8
 from gen_data.core.errors import AssetError, ConfigError, StorageError, list_names
 from gen_data.lab.matching import label_files
 from gen_data.lab.matching.label_files import RealObject
-from gen_data.lab.matching.real_files import choose_evenly, read_rgb
+from gen_data.lab.matching.real_files import choose_evenly, files_below, read_rgb
 
 _UNSTATED = (0, 0)
-_IMAGES = re.compile(rb'"images"\s*:\s*\[\s*[{\]]')
+_IMAGES = re.compile(rb'"(images|annotations)"\s*:\s*\[\s*[{\]]')
 """A list of objects: plans of data sets have lists of names there."""
-_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
+_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+_AMBIGUOUS = "image whose name several files have"
+_WORD_MIN = 3
+"""Letters from which on the beginning of a split's name stands for it: ``val`` for ``valid``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +134,9 @@ def read_real(
     """Read a folder with labels, in the first of ``LAYOUTS`` that it has.
 
     COCO: ``annotations/*.json`` or ``*.json``, and the images anywhere below. KITTI: ``label_2``
-    and ``image_2``. YOLO: a YAML file with ``names``, or ``classes.txt``; labels are in ``labels``
-    where images are in ``images``, else next to them. VOC: ``Annotations`` and ``JPEGImages``, or
-    any XML files with the images next to them.
+    and ``image_2``. YOLO: a YAML file with ``names``, whose splits are read if it has some, or
+    ``classes.txt``; labels are in ``labels`` where images are in ``images``, else next to them.
+    VOC: ``Annotations`` and ``JPEGImages``, or any XML files with the images next to them.
 
     Args:
         folder: The folder; also one that contains the folders of an export.
@@ -187,8 +189,8 @@ Found = Callable[[], RealSet] | None
 def _find_coco(folder: Path, split: str | None, most: int | None) -> Found:
     for root in (folder, folder / "coco"):
         listed = (root.glob(at) for at in ("annotations/*.json", "*.json", "*/_annotations.*.json"))
-        files = next(filter(None, map(sorted, listed)), [])
-        files = [path for path in files if _is_instances(path)]
+        sorts = ([path for path in sorted(at) if _is_instances(path)] for at in listed)
+        files = next(filter(None, sorts), [])
         # COCO's own folder has captions, too.
         files = [path for path in files if path.stem.startswith("instances")] or files
         if files:
@@ -215,10 +217,10 @@ def _find_yolo(folder: Path, _: str | None, most: int | None) -> Found:
 
 
 def _find_voc(folder: Path, _: str | None, most: int | None) -> Found:
-    for at in ("Annotations/*.xml", "VOC*/*/Annotations/*.xml", "voc/VOC*/*/Annotations/*.xml"):
-        if files := sorted(folder.glob(at)):
+    for at in ("Annotations", "VOC*/*/Annotations", "voc/VOC*/*/Annotations"):
+        if files := sorted(folder.glob(f"{at}/**/*.xml")):
             return partial(_read_voc, files, most)
-    files = [path for path in sorted(folder.rglob("*.xml")) if _is_voc(path)]
+    files = [p for p in files_below(folder) if p.suffix == ".xml" and _is_voc(p)]
     return partial(_read_voc, files, most) if files else None
 
 
@@ -280,40 +282,77 @@ class _Frame:
 def _read_coco(root: Path, paths: Sequence[Path], most: int | None) -> RealSet:
     frames: list[_Frame] = []
     skipped, ids = Counter[str](), dict[str, int]()
+    known = _images_by_name(root)
     for path in paths:
         labels = label_files.read_coco(path)
         ids |= labels.category_ids
         if labels.empty:
             skipped["object with an empty box"] += labels.empty
-        files = _find_images(root, path, [image.file_name for image in labels.images])
-        frames += (
-            _Frame(image.image_id, file, image.objects, image.size_px)
-            for image, file in zip(labels.images, files, strict=True)
-        )
-    pictures = sorted(_readable(frames, most, skipped), key=attrgetter("image_id"))
+        for image in labels.images:
+            found = _find_image(root, path, image.file_name, known)
+            if len(found) > 1:
+                skipped[_AMBIGUOUS] += 1
+            else:
+                file = found[0] if found else root / image.file_name
+                frames.append(_Frame(image.image_id, file, image.objects, image.size_px))
+    frames = _join_listed(frames, skipped)
+    # Ids of some tools are texts.
+    by_id = sorted(
+        _readable(frames, most, skipped), key=lambda p: (isinstance(p.image_id, str), p.image_id)
+    )
+    pictures = tuple(by_id)
     source = paths[0] if len(paths) == 1 else paths[0].parent
-    return _checked(RealSet(source, tuple(pictures), ids, skipped))
+    return _checked(RealSet(source, pictures, ids, skipped))
 
 
-def _find_images(root: Path, annotations: Path, names: Sequence[str]) -> list[Path]:
-    """Images by their names in an annotation file; a path without a file where there is none.
+def _join_listed(frames: Iterable[_Frame], skipped: Counter[str]) -> list[_Frame]:
+    """Frames with one for each image: files may list it again, with the same or other objects."""
+    joined: dict[Path, _Frame] = {}
+    for frame in frames:
+        first = joined.setdefault(frame.path, frame)
+        if first is not frame:
+            skipped["image that is listed again, read once"] += 1
+            more = [thing for thing in frame.objects if thing not in first.objects]
+            joined[frame.path] = replace(first, objects=(*first.objects, *more))
+    return list(joined.values())
 
-    Of several with one name, images in ``<split>/`` win, then images in the fewest folders: an
+
+def _images_by_name(root: Path) -> dict[str, list[Path]]:
+    known: dict[str, list[Path]] = {}
+    for path in files_below(root):
+        known.setdefault(path.name, []).append(path)
+    return known
+
+
+def _find_image(
+    root: Path, annotations: Path, stated: str, known: Mapping[str, Sequence[Path]]
+) -> list[Path]:
+    """Images that a name in an annotation file can mean: none, one, or several.
+
+    Of several with one name, images next to the annotations win, then images in folders of the
+    split, which the annotations' name has, then in ``images``, then in the fewest folders: an
     export holds depth and label images of the same names in separate folders.
     """
-    known: dict[str, list[Path]] = {}
-    for path in sorted(root.rglob("*.*")):
-        known.setdefault(path.name, []).append(path)
-    images = []
-    for name in map(Path, names):
-        found = [p for p in known.get(name.name, []) if p.parts[-len(name.parts) :] == name.parts]
-        best = max(
-            found,
-            default=root / name,
-            key=lambda p: (p.parent.name in annotations.stem, -len(p.parts)),
-        )
-        images.append(best)
-    return images
+    name = Path(stated)
+    found = [p for p in known.get(name.name, []) if p.parts[-len(name.parts) :] == name.parts]
+    words = re.split(r"[\W_]+", annotations.stem.casefold())
+
+    def rank(path: Path) -> tuple[bool, int, bool, int]:
+        folders = [folder.casefold() for folder in path.relative_to(root).parts[:-1]]
+        splits = sum(_is_split(folder, words) for folder in folders)
+        return path == annotations.parent / name, splits, "images" in folders, -len(folders)
+
+    best = max(map(rank, found), default=None)
+    return [path for path in found if rank(path) == best]
+
+
+def _is_split(folder: str, words: Iterable[str]) -> bool:
+    return any(
+        folder == word
+        or (min(len(folder), len(word)) >= _WORD_MIN
+            and (folder.startswith(word) or word.startswith(folder)))
+        for word in words
+    )  # fmt: skip
 
 
 def _read_kitti(root: Path, most: int | None) -> RealSet:
@@ -331,17 +370,40 @@ def _read_kitti(root: Path, most: int | None) -> RealSet:
 
 def _read_yolo(root: Path, classes: Path, most: int | None) -> RealSet:
     names, has_keypoints = label_files.read_yolo_classes(classes)
-    images = {_yolo_labels(path): path for path in sorted(root.rglob("*.*")) if _is_image(path)}
-    listed = {path for path in root.rglob("*.txt") if "labels" in path.parts or path in images}
+    below = files_below(root)
+    places = label_files.yolo_images(classes)
+    if places:
+        images = {_yolo_labels(path): path for path in _listed_images(places)}
+        folders = {_yolo_labels(place / "image.png").parent for place in places if place.is_dir()}
+        listed = {path for folder in folders for path in files_below(folder)} | images.keys()
+    else:
+        images = {_yolo_labels(path): path for path in below if _is_image(path)}
+        listed = {p for p in below if "labels" in p.relative_to(root).parts} | images.keys()
+    labels = {path for path in listed if path.suffix == ".txt" and path.is_file()}
+    # LabelImg puts its list of classes next to the labels.
+    labels = {path for path in labels if path != classes and path.name != "classes.txt"}
     skipped, frames = Counter[str](), []
-    for number, path in enumerate(sorted((listed | images.keys()) - {classes}), 1):
-        if path not in listed:
+    for number, path in enumerate(sorted(labels | images.keys()), 1):
+        if path not in labels:
             skipped["image without a label file, read as one without objects"] += 1
-        objects = label_files.read_yolo(path, names, has_keypoints) if path in listed else ()
+        objects = label_files.read_yolo(path, names, has_keypoints) if path in labels else ()
         image = images.get(path, path.with_suffix(".png"))
         frames.append(_Frame(number, image, objects, is_relative=True))
     ids = {name: number for number, name in enumerate(names, 1)}
     return _checked(RealSet(classes, tuple(_readable(frames, most, skipped)), ids, skipped))
+
+
+def _listed_images(places: Iterable[Path]) -> Iterator[Path]:
+    """Images in folders, of lists, and single ones."""
+    for place in places:
+        if place.is_dir():
+            yield from filter(_is_image, files_below(place))
+        elif place.suffix == ".txt":
+            for line in filter(None, map(str.strip, place.read_text("utf-8-sig").splitlines())):
+                # Ultralytics takes names that begin with ./ from the list's folder.
+                yield place.parent / line
+        else:
+            yield place
 
 
 def _yolo_labels(image: Path) -> Path:
@@ -354,17 +416,22 @@ def _yolo_labels(image: Path) -> Path:
 def _read_voc(paths: Sequence[Path], most: int | None) -> RealSet:
     frames = []
     for number, path in enumerate(paths, 1):
-        name, size_px, objects = label_files.read_voc(path)
-        near = path.parent.parent
-        folders = (near / "JPEGImages", path.parent, near / "images", near)
-        listed = (
-            at
-            for place in folders
-            for at in (place / Path(name).name, *(place / f"{path.stem}{s}" for s in _SUFFIXES))
-        )
-        image = next(filter(Path.is_file, listed), near / "JPEGImages" / f"{path.stem}.jpg")
-        frames.append(_Frame(number, image, objects, size_px))
+        stated, size_px, objects = label_files.read_voc(path)
+        frames.append(_Frame(number, _voc_image(path, Path(stated)), objects, size_px))
     return _numbered(paths[0].parent, frames, most, Counter())
+
+
+def _voc_image(path: Path, stated: Path) -> Path:
+    """The image of a file of annotations, which has its name; other names may be outdated."""
+    near, inner = path.parent.parent, Path()
+    if "Annotations" in path.parts:
+        at = len(path.parts) - path.parts[::-1].index("Annotations")
+        near, inner = Path(*path.parts[: at - 1]), Path(*path.parts[at:-1])
+    folders = (near / "JPEGImages" / inner, path.parent, near / "images" / inner, near / inner)
+    same = [f"{path.stem}{suffix}" for suffix in _SUFFIXES]
+    names = [stated.name, *same] if stated.stem == path.stem else [*same, stated.name]
+    listed = (folder / name for name in names if name for folder in folders)
+    return next(filter(Path.is_file, listed), folders[0] / f"{path.stem}.jpg")
 
 
 def _numbered(

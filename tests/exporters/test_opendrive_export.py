@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from gen_data.core.errors import ConfigError
 from gen_data.core.lane_geometry import border_line, left_normals
 from gen_data.core.scene import Lane, Scene
 from gen_data.exporters.opendrive import OpenDrive
@@ -199,3 +200,10 @@ def test_every_world_has_a_file_and_every_sample_names_it(world: Any, tmp_path: 
     assert [row["index"] for row in rows] == list(range(8))
     assert len(list(folder.glob("*.xodr"))) == 2
     check_files(folder)
+
+
+def test_lanes_whose_width_changes_are_refused() -> None:
+    line = ((0.0, 0.0, 0.0), (10.0, 0.0, 0.0))
+    taper = Lane("town/1.0.-1", "driving", line, 3.0, widths_m=(2.5, 3.5))
+    with pytest.raises(ConfigError, match=r"^exporter 'opendrive': lane 'town/1\.0\.-1' changes"):
+        OpenDrive().check_scene(Scene("street", lanes=(taper,)))

@@ -10,6 +10,7 @@ from gen_data.assets.checking import check_folder
 from gen_data.assets.library import open_library
 from gen_data.content.roads.network_surface import network_solid
 from gen_data.core.errors import AssetError
+from gen_data.core.lane_geometry import border_line
 from gen_data.core.scene import Lane
 from gen_data.roads.opendrive import read_opendrive
 from gen_data.roads.opendrive_lanes import network_lanes
@@ -50,13 +51,13 @@ def lanes(*roads: str, more: str = "") -> dict[str, Lane]:
     return {x.name: x for x in network_lanes(read_opendrive(text(*roads, more=more), "a.xodr"))}
 
 
-def painted_m(*roads: str, edge_m: float) -> list[tuple[float, float]]:
+def painted_m(*roads: str, edge_m: float, reach_m: float = 0.2) -> list[tuple[float, float]]:
     """From where to where along the road the line at ``y = edge_m`` is painted."""
     mesh = network_solid(read_opendrive(text(*roads), "a.xodr")).mesh
     slots = [k for k, material in enumerate(mesh.materials) if material.role == "marking"]
     faces = mesh.faces[np.isin(mesh.face_slots, slots)]
     corners = mesh.vertices_m[faces].astype(float)
-    corners = corners[np.abs(corners[..., 1] - edge_m).max(axis=1) < 0.2] + [50.0, 0.0, 0.0]
+    corners = corners[np.abs(corners[..., 1] - edge_m).max(axis=1) < reach_m] + [50.0, 0.0, 0.0]
     spans = sorted((c[:, 0].min(), c[:, 0].max()) for c in corners)
     merged: list[list[float]] = []
     for low, high in spans:
@@ -92,6 +93,59 @@ def test_marks_change_along_the_road(marks: str, spans: list[tuple[float, float]
     np.testing.assert_allclose(np.ravel(found), np.ravel(spans), atol=2e-3)
 
 
+DASHES = [(3 + 9 * k, 6 + 9 * k) for k in range(11)]
+WHOLE = [(0, 100)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "upper", "lower"),
+    [
+        ("solid broken", -1, WHOLE, DASHES),
+        ("solid broken", 0, WHOLE, DASHES),
+        ("solid broken", 1, DASHES, WHOLE),
+        ("broken solid", -1, DASHES, WHOLE),
+        ("broken solid", 1, WHOLE, DASHES),
+        ("solid solid", 0, WHOLE, WHOLE),
+        ("broken broken", -1, DASHES, DASHES),
+        ("botts dots", -1, [], []),
+        ("edge", -1, [], []),
+    ],
+)
+def test_double_marks_are_listed_from_the_inside_out(
+    kind: str, number: int, upper: list[tuple[float, float]], lower: list[tuple[float, float]]
+) -> None:
+    """ASAM OpenDRIVE 1.6, 9.6: of the centre lane from left to right."""
+    mark = f'<roadMark sOffset="0" type="{kind}" width="0.12"/>'
+    sides = {n: WIDTH + mark * (n == number) for n in (1, -1)}
+    made = road(lane(1, sides[1]), lane(-1, sides[-1]), center=mark if number == 0 else "")
+    edge_m = 3.5 * number
+    for spans, aside_m in ((upper, 0.12), (lower, -0.12)):
+        found = painted_m(made, edge_m=edge_m + aside_m, reach_m=0.07)
+        assert len(found) == len(spans)
+        np.testing.assert_allclose(np.ravel(found), np.ravel(spans), atol=2e-3)
+
+
+@pytest.mark.parametrize(("color", "yellow"), [("yellow", True), ("white", False)])
+def test_paint_has_the_colour_of_the_file(color: str, yellow: bool) -> None:
+    mark = f'<roadMark sOffset="0" type="solid" width="0.12" color="{color}"/>'
+    mesh = network_solid(read_opendrive(text(road(right=lane(-1), center=mark)), "a.xodr")).mesh
+    painted = [mesh.materials[k] for k in np.unique(mesh.face_slots)]
+    (paint,) = [material for material in painted if material.role == "marking"]
+    red, _, blue = paint.base_color
+    assert (red > 2.0 * blue) == yellow
+
+
+def test_marks_that_are_painted_otherwise_are_named() -> None:
+    marks = "".join(
+        f'<roadMark sOffset="{k}" type="{kind}" color="{color}"/>'
+        for k, (kind, color) in enumerate([
+            ("solid", "standard"), ("botts dots", "white"), ("broken", "red"), ("curb", "white"),
+        ])
+    )  # fmt: skip
+    network = read_opendrive(text(road(right=lane(-1, WIDTH + marks))), "a.xodr")
+    assert network.unused == {"color='red' of roadMark": 1, "type='botts dots' of roadMark": 1}
+
+
 # --- speeds ---
 
 TOWN = '<type s="0" type="town"><speed max="50" unit="km/h"/></type>'
@@ -120,6 +174,39 @@ def test_a_lane_may_have_a_speed_of_its_own() -> None:
 
     kmh = {name: round(x.speed_m_s * 3.6, 6) for name, x in found.items() if x.kind == "driving"}
     assert kmh == {"1.0.-1": 50.0, "1.1.-1": 50.0, "1.0.-2": 30.0, "1.1.-2": 36.0}
+
+
+@pytest.mark.parametrize(
+    ("speed", "limit_m_s"),
+    [
+        ('max="15"', 15.0),
+        ('max="36" unit="km/h"', 10.0),
+        ('max="25" unit="mph"', 25 * 1609.344 / 3600),
+    ],
+)
+def test_speeds_have_the_units_of_the_standard(speed: str, limit_m_s: float) -> None:
+    town = f'<type s="0" type="town"><speed {speed}/></type>'
+    assert lanes(road(right=lane(-1), types=town))["1.0.-1"].speed_m_s == pytest.approx(limit_m_s)
+
+
+def test_an_unknown_unit_of_a_speed_is_refused() -> None:
+    """50 "kmh" were 50 m/s."""
+    town = '<type s="0" type="town"><speed max="50" unit="kmh"/></type>'
+    told = r"^a\.xodr: road '1': the unit 'kmh' of a speed is unknown; expected m/s, km/h, mph$"
+    with pytest.raises(AssetError, match=told):
+        lanes(road(right=lane(-1), types=town))
+
+
+@pytest.mark.parametrize("kind", ["mwyEntry", "mwyExit", "slipLane", "HOV"])
+def test_lanes_of_ramps_and_full_cars_are_driven(kind: str) -> None:
+    assert lanes(road(right=lane(-1, kind=kind)))["1.0.-1"].kind == "driving"
+
+
+def test_a_connection_without_lanes_is_named() -> None:
+    ways = '<junction id="9"><connection id="0" incomingRoad="1" connectingRoad="2"/></junction>'
+    network = read_opendrive(text(road(right=lane(-1)), road(right=lane(-1), number=2), more=ways),
+                             "a.xodr")  # fmt: skip
+    assert network.unused == {"connection without laneLink": 1}
 
 
 def test_a_type_without_a_change_of_speed_splits_nothing() -> None:
@@ -374,3 +461,46 @@ def test_sidewalks_that_meet_head_on_lead_nowhere() -> None:
     found = lanes(road(right=walk, link=link), corner)
     assert found["1.0.-1"].center_m[-1] == found["2.0.1"].center_m[-1]
     assert found["1.0.-1"].successors == ()
+
+
+@pytest.mark.parametrize("rule", ["RHT", "LHT"])
+def test_borders_follow_lanes_that_widen_shift_and_twist(rule: str) -> None:
+    """Closed forms of the file: a taper beside an offset, on a superelevation that grows.
+
+    At s the offset is 0.02 s, the width 1 + 0.02 s, and the slope of the road tan(0.0005 s).
+    """
+    wide = '<width sOffset="0" a="1" b="0.02" c="0" d="0"/>'
+    twist = '<superelevation s="0" a="0" b="0.0005" c="0" d="0"/>'
+    made = road(lane(1), lane(-1, wide) + lane(-2), twist)
+    made = made.replace("<lanes>", '<lanes><laneOffset s="0" a="0" b="0.02" c="0" d="0"/>')
+    named = lanes(made.replace("<road ", f'<road rule="{rule}" '))
+    for name, is_upper, slope, middle_m in (
+        ("1.0.1", True, 0.02, 3.5),
+        ("1.0.1", False, 0.02, 0.0),
+        ("1.0.-1", True, 0.02, 0.0),
+        ("1.0.-1", False, 0.0, -1.0),
+        ("1.0.-2", True, 0.0, -1.0),
+        ("1.0.-2", False, 0.0, -4.5),
+    ):
+        one = named[name]
+        runs_east = one.center_m[0][0] < one.center_m[-1][0]
+        assert runs_east == ((name == "1.0.1") == (rule == "LHT"))
+        line = np.array(border_line(one, "left" if is_upper == runs_east else "right"))
+        s = line[:, 0] + 50.0
+        t = slope * s + middle_m
+        assert line[:, 1] == pytest.approx(t, abs=2e-3)
+        assert line[:, 2] == pytest.approx(t * np.tan(0.0005 * s), abs=2e-3)
+
+
+def test_borders_and_surface_bend_where_a_record_begins() -> None:
+    """A lane of 3 m widens from 33.1 m on by 0.1 per metre, to 5 m at 53.1 m."""
+    records = ((0, 3, 0), (33.1, 3, 0.1), (53.1, 5, 0))
+    widths = "".join(f'<width sOffset="{s}" a="{a}" b="{b}" c="0" d="0"/>' for s, a, b in records)
+    made = road(right=lane(-1, widths + SOLID))
+    line = np.array(border_line(lanes(made)["1.0.-1"], "right"))
+
+    outer_m = np.interp(line[:, 0] + 50.0, [33.1, 53.1], [-3.0, -5.0])
+    assert line[:, 1] == pytest.approx(outer_m, abs=0.01)
+    asphalt = network_solid(read_opendrive(text(made), "a.xodr")).mesh.vertices_m[:, :2]
+    corners = np.round(asphalt.astype(float), 4).tolist()
+    assert {(-16.9, -3.0), (3.1, -5.0)} <= set(map(tuple, corners))

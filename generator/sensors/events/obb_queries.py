@@ -222,7 +222,8 @@ def _side_segments(lane: Lane) -> tuple[Array, Array]:
     centre = np.asarray(lane.center_m, dtype=np.float64)[:, :2]
     along = np.gradient(centre, axis=0)
     along /= np.sqrt(np.sum(along**2, axis=1, keepdims=True))
-    left = 0.5 * lane.width_m * np.stack([-along[:, 1], along[:, 0]], axis=1)
+    half_m = lane_geometry.half_widths_m(lane)[:, None]
+    left = half_m * np.stack([-along[:, 1], along[:, 0]], axis=1)
     lines = (centre + left, centre - left)
     one, other = (np.stack([line[:-1], line[1:]], axis=1) for line in lines)
     return one, other
@@ -242,8 +243,9 @@ def _find_lane(scene: Scene, T_world_box: SE3) -> tuple[lane_geometry.LaneLine, 
         gaps = position - centre[:-1] - np.clip(share, 0.0, 1.0)[:, None] * span
         distances = np.sqrt(np.sum(gaps**2, axis=1))
         k = int(distances.argmin())
+        half_m = lane_geometry.half_widths_m(lane)
         beyond = (k == len(span) - 1 and share[k] > 1.0) or (k == 0 and share[k] < 0.0)
-        if beyond or distances[k] > 0.5 * lane.width_m or span[k] @ heading <= 0.0:
+        if beyond or distances[k] > half_m[k] or span[k] @ heading <= 0.0:
             continue
         if best is None or distances[k] < best[0]:
             at_m = lane_geometry.LaneLine(lane).at_m

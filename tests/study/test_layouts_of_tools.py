@@ -1,0 +1,192 @@
+"""Folders as annotation tools and exports of public sets lay them out: boxes meet their images."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gen_data.core.errors import StorageError
+from gen_data.lab.matching.label_files import RealObject
+from gen_data.lab.matching.real_files import find_files
+from gen_data.lab.study.real_pictures import read_real
+from tests.study.conftest import write_picture
+
+BOX = "0 0.5 0.5 0.25 0.5\n"
+
+
+def coco(path: Path, *boxes: dict[str, Any], name: str = "1.png", category: str = "cup") -> None:
+    """Annotations of one image without a stated size."""
+    rows = [{"id": k, "image_id": 1, "category_id": 1, **box} for k, box in enumerate(boxes)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    content = {
+        "annotations": rows,
+        "categories": [{"id": 1, "name": category}],
+        "images": [{"id": 1, "file_name": name}],
+    }
+    path.write_text(json.dumps(content))
+
+
+def write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+def found(folder: Path) -> dict[str, int]:
+    """Number of objects of each picture by its path."""
+    pictures = read_real(folder, None).pictures
+    return {p.path.relative_to(folder).as_posix(): len(p.objects) for p in pictures}
+
+
+@pytest.mark.parametrize(
+    ("label", "image"),
+    [
+        ("{}/_annotations.coco.json", "{}/1.png"),  # Roboflow
+        ("annotations/instances_{}2017.json", "{}2017/1.png"),
+        ("annotations/instances_{}.json", "images/{}/1.png"),
+        ("annotations/instances_{}.json", "{}/images/1.png"),
+    ],
+)
+def test_cocos_splits_keep_apart_images_of_one_name(label: str, image: str, tmp_path: Path) -> None:
+    """The boxes of each split are those of its own image, whichever comes first."""
+    for boxes, split in enumerate(("test", "train", "val"), 1):
+        box = {"bbox": [1, 1, 5, 5]}
+        coco(tmp_path / label.format(split), *[box] * boxes)
+        write_picture(tmp_path / image.format(split))
+    assert found(tmp_path) == {
+        image.format(s): k for k, s in enumerate(("test", "train", "val"), 1)
+    }
+
+
+def test_an_image_name_of_several_files_is_counted_and_not_guessed(tmp_path: Path) -> None:
+    coco(tmp_path / "labels.json", {"bbox": [1, 1, 5, 5]})
+    for folder in ("first", "second"):
+        write_picture(tmp_path / folder / "1.png")
+    with pytest.raises(StorageError, match=r"\(1 x image whose name several files have\)"):
+        read_real(tmp_path)
+    coco(tmp_path / "labels.json", {"bbox": [1, 1, 5, 5]}, name="second/1.png")
+    assert found(tmp_path) == {"second/1.png": 1}
+
+
+def test_an_image_in_several_cocos_files_counts_once_with_all_its_objects(tmp_path: Path) -> None:
+    """A file of all splits beside theirs, and a file for each class."""
+    write_picture(tmp_path / "images/1.png")
+    same, other = {"bbox": [1, 1, 5, 5]}, {"bbox": [9, 9, 5, 5]}
+    coco(tmp_path / "annotations/all.json", same, other)
+    coco(tmp_path / "annotations/train.json", same, other)
+    coco(tmp_path / "annotations/plates.json", same, category="plate")
+    real = read_real(tmp_path, None)
+    (picture,) = real.pictures
+    assert [(thing.name, thing.box[0]) for thing in picture.objects] == [
+        ("cup", 1.0), ("cup", 9.0), ("plate", 1.0),
+    ]  # fmt: skip
+    assert real.skipped == {"image that is listed again, read once": 2}
+
+
+@pytest.mark.parametrize("kind", ["images", "categories"])
+def test_ids_that_two_rows_of_cocos_file_share_are_refused(kind: str, tmp_path: Path) -> None:
+    """Boxes of one image would be in both."""
+    path = tmp_path / "labels.json"
+    coco(path, {"bbox": [1, 1, 5, 5]})
+    content = json.loads(path.read_text())
+    content[kind].append({"id": 1, "file_name": "2.png", "name": "plate"})
+    path.write_text(json.dumps(content))
+    with pytest.raises(StorageError, match=rf"{kind} share an id; expected one each"):
+        read_real(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("stated", "levels"),
+    [
+        ([0.0, 0.4, 1.0], ["visible", "partly occluded", "largely occluded"]),
+        ([0, 1, 2, 3], ["visible", "partly occluded", "largely occluded", ""]),
+        ([0, 1, 1], ["visible", "largely occluded", "largely occluded"]),
+        ([37, "?", None], ["", "", ""]),
+    ],
+)
+def test_occlusion_is_a_share_or_a_number_of_kittis_levels(
+    stated: list[Any], levels: list[str], tmp_path: Path
+) -> None:
+    write_picture(tmp_path / "1.png")
+    coco(tmp_path / "a.json", *[{"bbox": [1, 1, 5, 5], "occlusion": x} for x in stated])
+    (picture,) = read_real(tmp_path).pictures
+    assert [thing.occlusion for thing in picture.objects] == levels
+
+
+@pytest.mark.parametrize(("stated", "share"), [(0.25, 0.25), (1, 1.0), ("0.5", None), (37, None)])
+def test_truncation_is_a_share(stated: Any, share: float | None, tmp_path: Path) -> None:
+    write_picture(tmp_path / "1.png")
+    coco(tmp_path / "a.json", {"bbox": [1, 1, 5, 5], "truncation": stated})
+    (picture,) = read_real(tmp_path).pictures
+    assert picture.objects[0].truncation == share
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "train: [images/a, images/b]\nnames: {0: cup}\n",
+        "path: .\ntrain: images/a\nval: ../images/b\nnames: [cup]\n",
+        "train: list.txt\nval: images/b\nnames: [cup]\n",
+    ],
+)
+def test_yolos_splits_are_the_pictures(text: str, tmp_path: Path) -> None:
+    """Pictures of masks and of training runs, and folders left out on purpose, are none of them."""
+    write(tmp_path / "data.yaml", text)
+    write(tmp_path / "list.txt", "./images/a/1.png\n")
+    write(tmp_path / "labels/a/1.txt", BOX)
+    write(tmp_path / "labels/b/2.txt", "")
+    write(tmp_path / "labels/c/3.txt", BOX * 2)
+    write(tmp_path / "labels/classes.txt", "cup\n")
+    for name in ("images/a/1", "images/b/2", "images/c/3", "masks/1", "runs/val/confusion"):
+        write_picture(tmp_path / f"{name}.png")
+    real = read_real(tmp_path, None)
+    assert found(tmp_path) == {"images/a/1.png": 1, "images/b/2.png": 0}
+    assert real.pictures[0].objects == (RealObject("cup", (24, 12, 40, 36)),)
+    assert not real.skipped
+
+
+def test_yolos_labels_of_a_split_without_their_images_are_counted(tmp_path: Path) -> None:
+    write(tmp_path / "data.yaml", "train: images/train\nnames: [cup]\n")
+    write(tmp_path / "labels/train/1.txt", BOX)
+    write(tmp_path / "labels/train/2.txt", BOX)
+    write_picture(tmp_path / "images/train/1.png")
+    assert read_real(tmp_path).skipped == {"image that is missing": 1}
+
+
+def test_images_of_linked_folders_are_read_once(tmp_path: Path) -> None:
+    write_picture(tmp_path / "disk/1.png")
+    real = tmp_path / "real"
+    write(real / "data.yaml", "names: [cup]\n")
+    write(real / "labels/1.txt", BOX)
+    (real / "images").symlink_to(tmp_path / "disk", target_is_directory=True)
+    (real / "again").symlink_to(real, target_is_directory=True)
+    assert found(real) == {"images/1.png": 1}
+    assert find_files(real).photos == (real / "images/1.png",)
+
+
+VOC = (
+    "<annotation><filename>{}</filename><object><name>cup</name><bndbox><xmin>1.5</xmin>"
+    "<ymin>3</ymin><xmax>20.25</xmax><ymax>30</ymax></bndbox></object></annotation>"
+)
+
+
+def test_vocs_images_have_the_names_of_their_annotations(tmp_path: Path) -> None:
+    """``filename`` is outdated where files were renamed; the images of both exist."""
+    for number, stated in (("1", "2.png"), ("2", "gone.jpg")):
+        write_picture(tmp_path / f"JPEGImages/{number}.png")
+        write(tmp_path / f"Annotations/{number}.xml", VOC.format(stated))
+    assert list(found(tmp_path)) == ["JPEGImages/1.png", "JPEGImages/2.png"]
+    assert read_real(tmp_path).pictures[0].objects[0].box == (0.5, 2.0, 20.25, 30.0)
+
+
+def test_vocs_folders_may_have_folders(tmp_path: Path) -> None:
+    for split in ("train", "val"):
+        write_picture(tmp_path / f"JPEGImages/{split}/1.png")
+        write(tmp_path / f"Annotations/{split}/1.xml", VOC.format(f"{split}/1.png"))
+    assert list(found(tmp_path)) == ["JPEGImages/train/1.png", "JPEGImages/val/1.png"]
+
+
+def test_empty_lines_of_kittis_labels_are_none(tmp_path: Path) -> None:
+    write_picture(tmp_path / "image_2/1.png")
+    write(tmp_path / "label_2/1.txt", "Car 0 0 0 1 2 3 4\n\nCar 0 0 0 1 2 3 4\n\n")
+    assert found(tmp_path) == {"image_2/1.png": 2}
