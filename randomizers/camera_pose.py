@@ -164,7 +164,7 @@ class CameraPose(RandomizerBase):
             if self._is_free(camera, pose, scene, assets):
                 return replace(camera, T_world_camera=pose.rounded())
         remedy = "other distance_m, azimuth_deg or elevation_deg"
-        raise self.reject("no free place for a camera", remedy)
+        raise self.reject(f"no free place for camera '{camera.name}'", remedy)
 
     def _frame_thing(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
         """Draw the share once: places that are taken change object and direction, not the share.
@@ -186,9 +186,11 @@ class CameraPose(RandomizerBase):
                     return replace(camera, T_world_camera=pose.rounded())
         if not seen:
             remedy = "a smaller range of fills or off_center, or another lens"
-            raise self.reject("the lens cannot show an object at the drawn share", remedy)
+            reason = f"the lens of camera '{camera.name}' cannot show an object at the drawn share"
+            raise self.reject(reason, remedy)
         remedy = "another range of fills, azimuth_deg or elevation_deg, or a smaller clearance_m"
-        raise self.reject("no free place for a camera that frames an object", remedy)
+        reason = f"no free place from which camera '{camera.name}' frames an object"
+        raise self.reject(reason, remedy)
 
     def _draw_thing(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Thing:
         name = self.aim.draw(rng)

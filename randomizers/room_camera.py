@@ -98,7 +98,7 @@ class RoomCamera(base.RandomizerBase):
                 break
         if not found:
             remedy = "a smaller away_m, clearance_m or near_m, or another height_m"
-            raise self.reject("no free place for a camera in the room", remedy)
+            raise self.reject(f"no free place for camera '{camera.name}' in the room", remedy)
         return max(found, key=lambda one: one[0])[1]
 
     def _find(self, scene: Scene) -> tuple[list[Body], list[Body]]:

@@ -53,7 +53,7 @@ class Robot(PlacedElement):
             instances=(*scene.instances, instance),
             articulations=(*scene.articulations, articulation),
             bodies=(*scene.bodies, *kinematics.make_link_bodies(articulation, robot, parts)),
-            rigs=(*scene.rigs, make_wrist_rig(f"{self.name}_wrist", self.name, robot)),
+            rigs=(*scene.rigs, make_wrist_rig(scene_time.wrist_name(self.name), self.name, robot)),
         )
 
     def _find_installed(self, assets: interfaces.AssetIndex) -> str:

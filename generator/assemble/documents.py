@@ -5,6 +5,7 @@ A configuration extends others, and overrides elements of its template.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
@@ -17,6 +18,7 @@ from gen_data.config.renamed_keys import refuse_moved_keys, replace_old_words
 from gen_data.config.yaml_scalars import quote_value
 from gen_data.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
 from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.scene_time import wrist_name
 from gen_data.pipeline.splits import SHARES
 from gen_data.randomizers.arm_task_table import load_tasks
 from gen_data.sensors.calibration.load_calibrations import load_calibrations
@@ -87,7 +89,8 @@ def _with_files(document: Node) -> Node:
     if isinstance(exporters.content, tuple):
         exporters = exporters.with_children(_with_type)
     if isinstance(sensors.content, tuple):
-        sensors = sensors.with_children(_with_sensor_files)
+        wrists = _wrists_of(document.entries["elements"])
+        sensors = sensors.with_children(partial(_with_sensor_files, wrists))
     if isinstance(randomizers.content, tuple):
         randomizers = randomizers.with_children(lambda _, randomizer: load_tasks(randomizer))
     changed = {"sensors": sensors, "randomizers": randomizers, "exporters": exporters}
@@ -100,9 +103,15 @@ def _with_type(_number: str | int, item: Node) -> Node:
     return Node(item.position, {"type": item}) if isinstance(item.content, str) else item
 
 
-def _with_sensor_files(number: str | int, sensor: Node) -> Node:
+def _wrists_of(elements: Node) -> frozenset[str]:
+    """Names of the rigs on the hands of the robots among elements."""
+    robots = (item for item in elements.items if _kind_of(item) == "robot")
+    return frozenset(wrist_name(node_name(robot)) for robot in robots)
+
+
+def _with_sensor_files(wrists: frozenset[str], number: str | int, sensor: Node) -> Node:
     field = f"sensors[{number}]"
-    return load_calibrations(load_sheets(sensor, field), field)
+    return load_calibrations(load_sheets(sensor, field), field, wrists)
 
 
 def load_config_document(name: str) -> Node:

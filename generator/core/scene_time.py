@@ -30,6 +30,11 @@ EGO = "ego"
 """Name of the rig that truth about a sample as a whole refers to."""
 
 
+def wrist_name(robot: str) -> str:
+    """Name of the rig on the hand of a robot; its axes are ``HAND_RIG_AXES``."""
+    return f"{robot}_wrist"
+
+
 def scene_at(scene: Scene, time_s: float) -> Scene:
     """The scene at another instant.
 

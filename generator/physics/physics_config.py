@@ -74,5 +74,9 @@ class PhysicsConfig(Strict):
         "middle.",
     )
     layout_attempts_max: int = Field(
-        20, ge=1, le=1000, description="Layouts tried for one scene before it is given up."
+        20,
+        ge=1,
+        le=1000,
+        description="Layouts tried for one scene before it is given up, and draws tried for each "
+        "view of a layout.",
     )

@@ -6,16 +6,16 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import TracebackType
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gen_data.core import errors, interfaces
 from gen_data.core.capture import Capture, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
-from gen_data.core.scene import LABEL_IDS_MAX, Scene
+from gen_data.core.scene import Scene
 from gen_data.core.streams import Streams
-from gen_data.pipeline import checked_renderer, splits
+from gen_data.pipeline import attempts, checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline
 from gen_data.pipeline.numerics import numerics_digests
 from gen_data.pipeline.scene_stages import finish_settled, finish_view
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-T = TypeVar("T")
 SceneSource = Callable[
     [Streams], tuple[Scene, Sequence[interfaces.Randomizer], Sequence[interfaces.Sensor]]
 ]
@@ -47,7 +46,7 @@ class PipelineConfig:
         sequence_annotators: Add to the annotations of samples as a whole, which they need.
         split_shares: ``{split: share}`` in order; shares sum to 1.
         split_assignment: How scenes are assigned to splits.
-        layout_attempts_max: Largest number of attempts at one scene.
+        layout_attempts_max: Largest number of attempts at a scene, and at a view of a layout.
         strides: Steps between readings, by sensor; 1 for all others.
         located_errors: Opens a block that adds places in the configuration to errors of plug-ins.
     """
@@ -67,25 +66,6 @@ class PipelineConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class AcceptedScene:
-    """A settled scene with its plug-ins and its history.
-
-    Attributes:
-        randomizers: Draw its views.
-        sensors: Capture its views.
-        attempt: Number of the accepted attempt, from 0.
-        timings_s: CPU seconds by stage, all attempts together.
-    """
-
-    index: int
-    scene: Scene
-    randomizers: Sequence[interfaces.Randomizer]
-    sensors: Sequence[interfaces.Sensor]
-    attempt: int
-    timings_s: Mapping[str, float]
-
-
-@dataclass(frozen=True, slots=True)
 class DrawnView:
     """A view of a scene at the beginning of its sequence, with the streams that drew it.
 
@@ -98,11 +78,33 @@ class DrawnView:
     streams: Streams
 
 
+@dataclass(frozen=True, slots=True)
+class AcceptedScene:
+    """A settled scene, of which every view can be drawn, with its plug-ins and its history.
+
+    Attributes:
+        randomizers: Draw its views.
+        sensors: Capture its views.
+        attempt: Number of the accepted attempt, from 0.
+        timings_s: CPU seconds by stage, all attempts together.
+        views: All of its views, as drawn and not finished. None where drawing one raised an error
+            other than LayoutRejected: the samples of that view raise it.
+    """
+
+    index: int
+    scene: Scene
+    randomizers: Sequence[interfaces.Randomizer]
+    sensors: Sequence[interfaces.Sensor]
+    attempt: int
+    timings_s: Mapping[str, float]
+    views: tuple[DrawnView | None, ...] = ()
+
+
 class Pipeline:
     """Owner of the engines; ``sample(index)`` depends only on the configuration and the index.
 
     The last accepted scene and view are cached, because the next index is usually another view or
-    instant of them; the cache never changes a result.
+    instant of them, and the last scene that was rejected; the cache never changes a result.
     """
 
     def __init__(
@@ -119,6 +121,7 @@ class Pipeline:
         self._physics: interfaces.PhysicsEngine | None = None
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
+        self._rejected: tuple[int, tuple[errors.Rejection, ...]] | None = None
         self._view: DrawnView | None = None
         self._lifted: tuple[Scene, Scene] | None = None
         self._begun: tuple[Scene, tuple[object, ...]] | None = None
@@ -172,7 +175,8 @@ class Pipeline:
 
         Raises:
             ConfigError: a plug-in finds that a drawn value of its fields does not fit the scene.
-            SceneRejected: no valid layout within the bounded number of attempts.
+            SceneRejected: no layout within the bounded number of attempts is valid and has a place
+                for the cameras of every view.
             SampleError: the labels contradict each other.
         """
         view_number, step_index = divmod(index, self.info.steps_per_scene)
@@ -291,9 +295,19 @@ class Pipeline:
         return truth
 
     def accepted_scene(self, scene_index: int) -> AcceptedScene:
-        """The settled scene that its views share."""
+        """The settled scene that its views share.
+
+        Raises:
+            SceneRejected: all attempts at it were rejected.
+        """
+        if self._rejected is not None and self._rejected[0] == scene_index:
+            raise errors.SceneRejected(*self._rejected)
         if self._latest is None or self._latest.index != scene_index:
-            self._latest = self._accept(scene_index)
+            try:
+                self._latest = self._accept(scene_index)
+            except errors.SceneRejected as rejected:
+                self._rejected = scene_index, rejected.rejections
+                raise
         return self._latest
 
     def split(self, scene_index: int) -> str:
@@ -302,6 +316,11 @@ class Pipeline:
         return splits.split_of(scene_index, shares, assignment, self.info.seed)
 
     def _accept(self, scene_index: int) -> AcceptedScene:
+        """The first layout that is valid and of which every view can be drawn.
+
+        All views are drawn whichever is asked for: the attempt that is accepted, and with it every
+        sample, depends on the index of the scene only.
+        """
         assert self._physics is not None, "use the pipeline as a context manager"
         physics = self._physics
         timings: dict[str, float] = {}
@@ -310,69 +329,61 @@ class Pipeline:
             streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
             with _timed(timings, "randomize"):
                 nominal, randomizers, sensors = self.config.open_scene(streams)
-                scene = self._randomize(nominal, randomizers, interfaces.Stage.BUILD, streams)
+                build = interfaces.Stage.BUILD
+                scene = attempts.randomize(nominal, randomizers, build, self.assets, streams)
             with _timed(timings, "physics"):
                 settled = physics.settle(scene)
             if settled.rejection is not None:
                 raise errors.LayoutRejected(settled.rejection)
-            scene = finish_settled(settled.scene, self.assets, self._category_ids)
-            return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
+            scene = self._finish_settled(settled.scene)
+            accepted = AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
+            with _timed(timings, "randomize"):
+                numbers = range(self.info.views_per_scene)
+                views = tuple(self._view_unless_wrong(accepted, number) for number in numbers)
+            return replace(accepted, views=views)
 
-        return self._first_accepted(scene_index, settle)
+        return attempts.first_accepted(scene_index, self.config.layout_attempts_max, settle)
 
-    def _first_accepted(self, scene_index: int, draw: Callable[[int], T]) -> T:
-        """Result of the first attempt that is not rejected; SceneRejected if all are."""
-        rejections: list[errors.Rejection] = []
-        for attempt in range(self.config.layout_attempts_max):
-            try:
-                return draw(attempt)
-            except errors.LayoutRejected as refused:
-                rejections.append(refused.rejection)
-        raise errors.SceneRejected(scene_index, tuple(rejections))
+    def _view_unless_wrong(self, accepted: AcceptedScene, view_index: int) -> DrawnView | None:
+        """A view, not finished; None if drawing it raises an error other than LayoutRejected."""
+        try:
+            return self._draw_view(accepted, view_index)
+        except errors.LayoutRejected:
+            raise
+        except Exception:
+            return None
 
     def drawn_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
         """A view of a scene at time 0."""
         number = accepted.index * self.info.views_per_scene + view_index
-        if self._view is not None and self._view.number == number:
-            return self._view
-
-        def draw(attempt: int) -> DrawnView:
-            streams = self.info.view_streams(accepted.index, view_index, attempt)
-            scene = self._randomize(
-                accepted.scene.twin(self.info.twin(view_index)),
-                accepted.randomizers,
-                interfaces.Stage.VIEW,
-                streams,
-            )
-            return DrawnView(number, self._finish(scene), streams)
-
-        self._view = self._first_accepted(accepted.index, draw)
+        if self._view is None or self._view.number != number:
+            kept = accepted.views[view_index] if accepted.views else None
+            drawn = kept or self._draw_view(accepted, view_index)
+            self._view = replace(drawn, scene=self._finish(drawn.scene))
         return self._view
+
+    def _draw_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
+        """A view, not finished. Raises LayoutRejected if this layout leaves no place for it."""
+        scene, streams = attempts.draw_view(
+            accepted.scene,
+            accepted.index,
+            view_index,
+            accepted.randomizers,
+            self.info,
+            self.assets,
+            self.config.layout_attempts_max,
+        )
+        return DrawnView(accepted.index * self.info.views_per_scene + view_index, scene, streams)
+
+    def _finish_settled(self, scene: Scene) -> Scene:
+        """The scene that its views share, from the one that physics settled."""
+        return finish_settled(scene, self.assets, self._category_ids)
 
     def _finish(self, scene: Scene) -> Scene:
         """The scene of a view as it was drawn, ready for sensors."""
         finished = finish_view(scene, self.assets, self._category_ids, self._lifted)
         self._lifted = None if scene.relief is None else (scene, finished)
         return finished
-
-    def _randomize(
-        self,
-        scene: Scene,
-        randomizers: Sequence[interfaces.Randomizer],
-        stage: interfaces.Stage,
-        streams: Streams,
-    ) -> Scene:
-        """Apply the randomizers of a stage; ConfigError if there are too many instances."""
-        for randomizer in randomizers:
-            if randomizer.stage == stage:
-                rng = streams.rng(f"randomizer/{randomizer.name}")
-                scene = randomizer(scene, self.assets, rng)
-        if len(scene.instances) > LABEL_IDS_MAX:
-            raise errors.ConfigError(
-                f"scene {streams.scene}: {len(scene.instances)} instances, but label images have "
-                f"room for {LABEL_IDS_MAX}; place fewer objects"
-            )
-        return scene
 
 
 def _count_lidar_points(

@@ -27,6 +27,7 @@ from gen_data.core.serialization import canonical_json, to_plain
 from gen_data.core.streams import Rng, Streams
 from gen_data.packs.provision import open_assets
 from gen_data.physics import open_engine
+from gen_data.pipeline import attempts
 from gen_data.pipeline.scene_stages import finish_settled, finish_view
 from gen_data.runner import plan, provenance
 from gen_data.runner.stored import StoredSamples
@@ -178,15 +179,18 @@ class Replay:
             nominal, randomizers, _ = self._open_scene(streams)
             log.extend(shared_draws(self._config, nominal))
             observed = tuple(observe_randomizer(randomizer, log) for randomizer in randomizers)
-            drawn = self._randomize(nominal, observed, Stage.BUILD, streams)
+            drawn = attempts.randomize(nominal, observed, Stage.BUILD, self._library, streams)
             settled = physics.settle(drawn)
             if settled.rejection is not None:
                 raise LayoutRejected(settled.rejection)
-            return finish_settled(settled.scene, self._library, self._category_ids), observed
+            scene = finish_settled(settled.scene, self._library, self._category_ids)
+            if attempt < accepted:
+                self._draw_views(number, scene, randomizers)
+            return scene, observed
 
         samples = range(first, min(first + self.per_scene, self._stored.plan.n))
-        attempts = self._stored.kept_scene(first).attempts
-        scene, observed = self._accept(attempts, settle, log, samples)
+        accepted = self._stored.kept_scene(first).attempts - 1
+        scene, observed = self._accept(accepted, settle, log, samples)
         views = []
         for view in range(min(info.views_per_scene, self._views_left(first))):
             index = number * info.views_per_scene + view
@@ -196,43 +200,41 @@ class Replay:
 
             def draw_view(attempt: int, view: int = view) -> Scene:
                 streams = info.view_streams(number, view, attempt)
-                drawn = self._randomize(scene.twin(info.twin(view)), observed, Stage.VIEW, streams)
+                twin = scene.twin(info.twin(view))
+                drawn = attempts.randomize(twin, observed, Stage.VIEW, self._library, streams)
                 return finish_view(drawn, self._library, self._category_ids)
 
-            views.append((kept, self._accept(kept.view_attempts, draw_view, log, samples)))
+            views.append((kept, self._accept(kept.view_attempts - 1, draw_view, log, samples)))
         self.differences += islice(filter(None, starmap(_first_difference, views)), 1)
 
     def _views_left(self, first: int) -> int:
         return -(-(self._stored.plan.n - first) // self._stored.info.steps_per_scene)
 
+    def _draw_views(self, number: int, scene: Scene, randomizers: Sequence[Randomizer]) -> None:
+        """Draw all views of a layout. Raises LayoutRejected if it leaves no place for one."""
+        info, most = self._stored.info, self._config.general.physics.layout_attempts_max
+        for view in range(info.views_per_scene):
+            attempts.draw_view(scene, number, view, randomizers, info, self._library, most)
+
     def _accept(
-        self, attempts: int, draw: Callable[[int], Any], log: list[Draw], samples: range
+        self, accepted: int, draw: Callable[[int], Any], log: list[Draw], samples: range
     ) -> Any:
         """Result of the attempt that the data set accepted; counts the ones before it.
 
         Attempts leave their draws in the log.
         """
-        for attempt in range(attempts):
+        for attempt in range(accepted + 1):
             log.clear()
             try:
-                accepted = draw(attempt)
+                result = draw(attempt)
             except LayoutRejected as refused:
-                if attempt == attempts - 1:
+                if attempt == accepted:
                     raise
                 self.rejections[(refused.rejection.reason, refused.rejection.remedy)] += 1
             if attempt == 0:
                 self._keep_firsts(log)
         self._keep(log, samples)
-        return accepted
-
-    def _randomize(
-        self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
-    ) -> Scene:
-        for randomizer in randomizers:
-            if randomizer.stage == stage:
-                rng = streams.rng(f"randomizer/{randomizer.name}")
-                scene = randomizer(scene, self._library, rng)
-        return scene
+        return result
 
     def _keep(self, draws: Sequence[Draw], samples: range) -> None:
         for name, distribution, value in draws:

@@ -62,13 +62,11 @@ class RememberingPhysics:
     Attributes:
         engine: The engine.
         settings: Its settings as text.
-        latest: The scene settled last.
     """
 
     engine: PhysicsEngine
     settings: str
     memory: Memory
-    latest: Scene | None = None
 
     def __enter__(self) -> PhysicsEngine:
         """Start the engine."""
@@ -87,6 +85,4 @@ class RememberingPhysics:
     def settle(self, scene: Scene) -> Settled:
         """Settle a scene."""
         settings = ("settle", self.settings)
-        settled = self.memory.get(scene, settings, lambda: self.engine.settle(scene))
-        self.latest = settled.scene
-        return settled
+        return self.memory.get(scene, settings, lambda: self.engine.settle(scene))

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from gen_data.core.scene import Scene
     from gen_data.core.streams import Rng, Streams
     from gen_data.physics.physics_config import PhysicsConfig
-    from gen_data.pipeline.pipeline import AcceptedScene
+    from gen_data.pipeline.pipeline import AcceptedScene, DrawnView
     from gen_data.preview.overlay import Image
 
 TEXTS_KEPT = 4
@@ -375,7 +375,7 @@ class OpenedText:
             self._settings, open_scene=self._observed_scene, channels=needed, frame_truth=None
         )
         with pipeline.config.located_errors():
-            accepted = self._kept_scene(pipeline.accepted_scene(scene_index))
+            accepted = pipeline.accepted_scene(scene_index)
             drawn = pipeline.drawn_view(accepted, view_index)
             scene, factor = self._with_small_camera(drawn.scene, view.sensor, width_px)
             pipeline.config = replace(
@@ -412,12 +412,6 @@ class OpenedText:
         )
         return annotate_reading(scene, reading, annotators, smaller, self.library)
 
-    def _kept_scene(self, accepted: AcceptedScene) -> AcceptedScene:
-        """The same with the scene object of an earlier text: views are cached by this object."""
-        settings = ("finish", self.info.categories)
-        scene = self._memory.get(self._physics.latest, settings, lambda: accepted.scene)
-        return replace(accepted, scene=scene)
-
     def _observed_scene(self, streams: Streams) -> Any:
         config, shared = self._config, self._config.shared(streams)
         # The first scene was read with the text. As text: 1, 1.0 and true are equal.
@@ -451,9 +445,24 @@ class OpenedText:
 
 
 class RememberingPipeline(Pipeline):
-    """A pipeline that finishes no view twice."""
+    """A pipeline that finishes no scene twice, whose randomizers show the draws of the latest view.
+
+    Attributes:
+        memory: Scenes as they were finished.
+    """
 
     memory: Memory
+
+    def drawn_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
+        """The view, drawn again: the latest draws belong to the last view of its scene."""
+        drawn = self._draw_view(accepted, view_index)
+        return replace(drawn, scene=self._finish(drawn.scene))
+
+    def _finish_settled(self, scene: Scene) -> Scene:
+        settings = ("settled", self.info.categories)
+        return self.memory.get(
+            scene, settings, lambda: super(RememberingPipeline, self)._finish_settled(scene)
+        )
 
     def _finish(self, scene: Scene) -> Scene:
         settings = ("view", self.info.categories)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +20,7 @@ from gen_data.core.sample import ImageTruth
 from gen_data.core.scene import Articulation, Body, Camera, Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.core.streams import Streams
 from gen_data.pipeline import Pipeline
 from gen_data.pipeline.finalize_scene import finalize_scene
 from gen_data.pipeline.pipeline import PipelineConfig
@@ -179,6 +180,130 @@ def test_refused_draw_is_tried_again_with_other_streams(stage: Stage) -> None:
             attempts.add(made.sample(0).attempts)
 
     assert max(attempts) > 1 or stage is Stage.VIEW
+
+
+@dataclass(frozen=True)
+class NeedsRoom:
+    """A randomizer that can draw the views ``of`` only of layouts with a yaw of at least ``least``.
+
+    Attributes:
+        error: Raised where there is no room.
+    """
+
+    of: tuple[int, ...]
+    least: float = 0.6
+    error: Exception = field(
+        default_factory=lambda: LayoutRejected(Rejection("no place for camera", "fewer cups"))
+    )
+    name: str = "orbit"
+    stage: Stage = Stage.VIEW
+
+    def __call__(self, scene: Scene, assets: object, rng: Any) -> Scene:
+        if rng.streams.view in self.of and scene.environment.yaw_rad < self.least:
+            raise self.error
+        return scene
+
+
+def facts(made: Pipeline, index: int) -> tuple[int, int, float]:
+    """Attempts at the scene and the view, and the yaw of the scene."""
+    sample = made.sample(index)
+    return sample.attempts, sample.view_attempts, sample.scene.environment.yaw_rad
+
+
+def layouts_rad(scene: int) -> list[float]:
+    """Yaws of the layouts of a scene, attempt by attempt."""
+    streams = [Streams(7, scene, attempt=attempt) for attempt in range(5)]
+    drawn = [BUILD(Scene("test"), None, one.rng("randomizer/build")) for one in streams]
+    return [layout.environment.yaw_rad for layout in drawn]
+
+
+def test_a_layout_without_room_for_one_of_its_views_is_drawn_again_for_all() -> None:
+    """40 scenes: each is the first of its layouts with room for view 2, also in views 0 and 1."""
+    with pipeline(BUILD, NeedsRoom(of=(2,))) as made:
+        found = [facts(made, index) for index in range(120)]
+    numbers = Counter[int]()
+    for scene in range(40):
+        yaws_rad = layouts_rad(scene)
+        number = next(k for k, yaw_rad in enumerate(yaws_rad) if yaw_rad >= 0.6)
+        assert set(found[3 * scene : 3 * scene + 3]) == {(number + 1, 1, yaws_rad[number])}
+        numbers[number] += 1
+    assert numbers[0] > 10
+    assert numbers[1] > 5
+
+
+@pytest.mark.parametrize("order", [(2, 1, 0), (1, 2, 0), (0, 1, 2)])
+def test_layouts_do_not_depend_on_the_view_that_is_asked_for_first(order: tuple[int, ...]) -> None:
+    """All of one pipeline in order, and each view by another pipeline, in any order."""
+    picky = BUILD, VIEW, NeedsRoom(of=(1,)), NeedsRoom(of=(2,), name="other", least=0.3)
+    with pipeline(*picky) as one:
+        expected = [canonical_json(one.sample(index).scene) for index in range(30)]
+    for scene in range(10):
+        with pipeline(*picky) as other:
+            for view in order:
+                index = 3 * scene + view
+                assert canonical_json(other.sample(index).scene) == expected[index]
+        with pipeline(*picky) as alone:
+            index = 3 * scene + order[0]
+            assert canonical_json(alone.sample(index).scene) == expected[index]
+
+
+def test_layouts_that_never_have_room_for_a_view_are_refused_with_the_view() -> None:
+    """Five draws for each of five layouts, which the other samples of the scene do not repeat."""
+    physics = AcceptingPhysics()
+    made = pipeline(BUILD, NeedsRoom(of=(1,), least=9.0), physics=physics)
+    text = (
+        "scene 1: no valid layout in 5 attempts (5 x no place for camera).\n"
+        "  Best: attempt 1: all 5 draws of view 1 are rejected.\n"
+        "  Try: 1. fewer cups"
+    )
+    with made:
+        for index in (3, 4, 5):
+            with pytest.raises(SceneRejected) as error:
+                made.sample(index)
+            assert str(error.value) == text
+        assert physics.settled == 5
+
+
+def test_the_best_layout_is_the_one_that_has_room_for_most_views() -> None:
+    """Only the layout of scene 1 with the largest yaw has room for view 1, and none for view 2."""
+    yaws_rad = layouts_rad(1)
+    limits = (NeedsRoom((1,), max(yaws_rad)), NeedsRoom((2,), 9.0, name="other"))
+    with pipeline(BUILD, *limits) as made, pytest.raises(SceneRejected) as error:
+        made.sample(3)
+    number = 1 + yaws_rad.index(max(yaws_rad))
+    assert number > 1
+    best = f"Best: attempt {number}: all 5 draws of view 2 are rejected."
+    assert best in str(error.value)
+
+
+def test_an_error_of_a_view_leaves_the_other_views_of_its_scene() -> None:
+    """Only a rejection is a property of the layout; another fault is one of its view alone."""
+    broken = NeedsRoom(of=(1,), least=9.0, error=ValueError("broken texture"))
+    with pipeline(BUILD, broken) as made, pipeline(BUILD) as free:
+        for index in (3, 5):
+            assert facts(made, index) == facts(free, index)
+        for _ in range(2):
+            with pytest.raises(ValueError, match="broken texture"):
+                made.sample(4)
+
+
+def test_every_view_of_a_scene_is_drawn_once() -> None:
+    """The draws that decide on the layout serve the samples, in any order."""
+    drawn: Counter[tuple[int, int]] = Counter()
+
+    @dataclass(frozen=True)
+    class Counts:
+        name: str = "counts"
+        stage: Stage = Stage.VIEW
+
+        def __call__(self, scene: Scene, assets: Any, rng: Any) -> Scene:
+            drawn[rng.streams.scene, rng.streams.view] += 1
+            return scene
+
+    with pipeline(BUILD, Counts()) as made:
+        for index in (1, 0, 2, 5, 3, 4):
+            made.sample(index)
+    assert drawn == Counter((scene, view) for scene in range(2) for view in range(3))
 
 
 def test_more_instances_than_label_images_hold_are_refused() -> None:

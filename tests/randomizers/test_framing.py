@@ -274,8 +274,8 @@ WIDE = replace(SCENE.cameras[0], intrinsics=LENSES["panorama"])
 
 @pytest.mark.parametrize(("scene", "fills", "reason"), [
     (replace(SCENE, bodies=SCENE.bodies[:1]), 0.3, "no object of the group 'clutter'"),
-    (SCENE, 0.001, "no free place for a camera that frames"),
-    (replace(SCENE, cameras=(WIDE,)), 3.0, "the lens cannot show an object"),
+    (SCENE, 0.001, "no free place from which camera 'color' frames an object"),
+    (replace(SCENE, cameras=(WIDE,)), 3.0, "the lens of camera 'color' cannot show an object"),
 ])  # fmt: skip
 def test_empty_group_and_unreachable_share_are_rejected_with_a_reason(
     scene: Scene, fills: float, reason: str

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.assemble.config import load_config
+from gen_data.assemble.config import load_config, parse_config
 from gen_data.assets.library import open_library
 from gen_data.core.errors import ConfigError, ConfigWarning
 from gen_data.core.intrinsics import Intrinsics
@@ -640,6 +640,20 @@ def test_a_camera_on_a_hand_is_where_the_links_of_its_robot_have_it(tmp_path: Pa
     with pytest.warns(ConfigWarning, match="joint a"):
         message = told(tmp_path, text.replace(", %s", ""), "arm.urdf")
     assert "mounting.relative_axes: the rig 'arm_wrist' has X out of the hand; state" in message
+
+
+def test_only_rigs_of_robots_need_the_axes_of_the_hand(tmp_path: Path) -> None:
+    """Whatever the names of others: a stand has X ahead, as links have."""
+    (tmp_path / "arm.urdf").write_text(HAND)
+    config = CONFIG % "rig: %s, mounting: {file: arm.urdf, frame: eye_link, relative_to: hand}"
+    stand = config % "pole_wrist" + "elements: [{type: stand, name: pole_wrist}]"
+    robot = config % "left_wrist" + "elements: [{type: robot, name: left, on: table}]"
+    with pytest.warns(ConfigWarning, match="joint a"):
+        found = parse_config(stand, str(tmp_path / "mine.yaml"), "mine").sensors[0]
+    assert (found.rig, found.offset_m) == ("pole_wrist", (0.07, 0.02, 0.03))
+    refusal = "mounting.relative_axes: the rig 'left_wrist' has X out of the hand"
+    with pytest.warns(ConfigWarning, match="joint a"), pytest.raises(ConfigError, match=refusal):
+        parse_config(robot, str(tmp_path / "mine.yaml"), "mine")
 
 
 INTRINSICS = "intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1"

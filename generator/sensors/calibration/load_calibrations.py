@@ -5,7 +5,7 @@ Plans are therefore self-contained, and errors name the file and line that they 
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -28,10 +28,13 @@ _EXCLUDED = {
 }
 
 
-def load_calibrations(sensor: Node, field: str) -> Node:
+def load_calibrations(sensor: Node, field: str, wrists: Collection[str]) -> Node:
     """Replace the names of calibration files in a sensor's document by their content.
 
-    ``field`` is the path of the sensor in messages: ``sensors[0]``.
+    Args:
+        sensor: The document; a sensor without such names is returned unchanged.
+        field: Path of the sensor in messages: ``sensors[0]``.
+        wrists: Names of the rigs on hands of robots: X points out of the hand.
 
     Raises:
         ConfigError: a file cannot be read, has another layout, or describes a sensor without
@@ -45,7 +48,7 @@ def load_calibrations(sensor: Node, field: str) -> Node:
     if lens is not None and lens.get("file") is not None:
         content |= _load_lens(sensor, lens, field)
     if mounting is not None and mounting.get("file") is not None:
-        content |= _load_mounting(sensor, mounting, field)
+        content |= _load_mounting(sensor, mounting, field, wrists)
         del content["mounting"]
     return replace(sensor, content=content)
 
@@ -74,7 +77,9 @@ def _load_lens(sensor: Node, lens: Node, field: str) -> dict[str, Node]:
     return found
 
 
-def _load_mounting(sensor: Node, mounting: Node, field: str) -> dict[str, Node]:
+def _load_mounting(
+    sensor: Node, mounting: Node, field: str, wrists: Collection[str]
+) -> dict[str, Node]:
     """The place on its rig of a sensor in a calibration file."""
     _check_alone(sensor, "mounting", field)
     asked = _validated(mounting, Mounting, f"{field}.mounting")
@@ -87,7 +92,7 @@ def _load_mounting(sensor: Node, mounting: Node, field: str) -> dict[str, Node]:
         refuse(mounting.position, f"{field}.mounting", str(error))
     rig = sensor.get("rig")
     is_unstated = asked.relative_axes is None and not calibration.frames[base].optical
-    if rig is not None and rig.text.endswith("_wrist") and is_unstated:
+    if rig is not None and rig.text in wrists and is_unstated:
         fact = (
             f"the rig '{rig.text}' has X out of the hand; state the axes of '{base}': "
             "relative_axes: hand (Z out of it, as of the link of a gripper) or body"
