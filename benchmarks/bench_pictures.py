@@ -2,11 +2,11 @@
 
 Pictures come from the first step of every view of a configuration, or (``--kitti FOLDER``) from
 ``label_2`` of KITTI's object format. Objects are the rows of KITTI's labels: image boxes around the
-projected 3D box, ``DontCare`` left out. Heights are in pixels of KITTI's camera (focal length 721.5
-px), and so are the least sizes of what is labelled; a camera on a rig counts as if it were level
-and as high as KITTI's, below which its image cuts off near cars. Pictures are rendered at a third
-of these pixels, since labels need few. ``--light`` adds grey levels: pictures with people are
-rendered again at full size. Real labels have no silhouettes, so real figures refer to boxes.
+projected 3D box, ``DontCare`` left out. Real figures are of what KITTI's camera sees: the first
+camera of a configuration takes its size, lens, height and direction, and keeps its place and its
+image pipeline. Pictures are rendered small, since labels need few pixels. ``--light`` adds grey
+levels: pictures with people are rendered again at full size. Real labels have no silhouettes, so
+real figures refer to boxes.
 
 The column ``real`` is read from ``street_figures.yaml``.
 """
@@ -26,25 +26,23 @@ from benchmarks.real_figures import real_figures
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.capture import Channel
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth
-from gen_data.core.se3 import SE3
 from gen_data.exporters.kitti import Kitti, label_rows
 from gen_data.lab.study.real_pictures import read_image
 from gen_data.pipeline.pipeline import AcceptedScene, Pipeline
+from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 Pixels = Mapping[Channel, NDArray[Any]]
 
 FOCAL_PX = 721.5
 """Focal length of KITTI's rectified cameras."""
-ROWS = 375
-"""Rows of KITTI's images."""
+SIZE_PX = 1242, 375
+"""Width and height of KITTI's rectified images."""
+HFOV_DEG = 81.43
 HEIGHT_M = 1.65
 """Height of KITTI's cameras above the ground (Geiger et al., figure 3)."""
 SHRUNK = 3
-"""KITTI's pixels per pixel of the pictures without ``--light``."""
-LEAST_VISIBLE_PX, LEAST_BOX_PX = 16, 3
-"""Smallest labelled objects, in KITTI's pixels: visible ones, and those of a side of the box."""
+"""Factor between the sizes of pictures without and with ``--light``."""
 ENDS_PX = (0.0, 25.0, 48.0, 96.0, 192.0, math.inf)
 BINS = ("< 25", "25-48", "48-96", "96-192", "> 192")
 DARK = 25
@@ -62,7 +60,7 @@ class Labelled:
         size_px: Width and height in KITTI's pixels.
         size_m: Length, width and height.
         away_m: Distance along the ground.
-        below_m: Depth of the bottom below a level camera in KITTI's height above the rig.
+        below_m: Depth of the bottom below the camera.
         truncation: Share outside the image.
     """
 
@@ -74,48 +72,15 @@ class Labelled:
     truncation: float
 
     @classmethod
-    def of(
-        cls, row: str, focal_px: float, middle_px: float, T_rig_camera: SE3 | None = None
-    ) -> "Labelled | None":
-        """The object of a row; None for other kinds, and outside the image rows of KITTI.
-
-        Args:
-            row: Line of a label file.
-            focal_px: Focal length.
-            middle_px: Image row in the middle of the rows that KITTI would have.
-            T_rig_camera: Mounting, both frames X forward, Y left, Z up; None = as KITTI's.
-        """
-        kind, truncation, _, _, left, top, right, bottom, *rest = row.split()
+    def of(cls, row: str, px: float = 1.0) -> "Labelled | None":
+        """The object of a row, whose pixels are ``px`` of KITTI's; None = of another kind."""
+        kind, truncation, _, _, left, top, right, bottom, h, w, length, x, y, z, _ = row.split()
         if kind not in KINDS:
             return None
-        h, w, length, x, y, z, _ = map(float, rest)
-        scale = FOCAL_PX / focal_px
-        slopes = ((float(edge) - middle_px) / focal_px for edge in (top, bottom))
-        rows = (_slope_as_kitti(x, z, slope, T_rig_camera) * FOCAL_PX for slope in slopes)
-        # Higher images show near cars whole, of which KITTI's cut off the lower part.
-        high, low = (min(max(row, -0.5 * ROWS), 0.5 * ROWS) for row in rows)
-        if high >= low:
-            return None
-        size_px = (float(right) - float(left)) * scale, low - high
-        below_m, _ = _as_kitti(x, y, z, T_rig_camera)
-        size_m, away_m = (length, w, h), math.hypot(x, z)
-        return cls(KINDS[kind], size_px, size_m, away_m, below_m, float(truncation))
-
-
-def _as_kitti(x: float, y: float, z: float, T_rig_camera: SE3 | None) -> tuple[float, float]:
-    """Depth below and distance ahead of a level camera in KITTI's height, of a camera's point."""
-    if T_rig_camera is None:
-        return y, z
-    ahead_m, _, above_m = T_rig_camera.apply(np.array([z, -x, -y]))
-    return HEIGHT_M - float(above_m), float(ahead_m) - T_rig_camera.translation_m[0]
-
-
-def _slope_as_kitti(x: float, z: float, slope: float, T_rig_camera: SE3 | None) -> float:
-    """Slope below the axis of KITTI's camera, of a point at depth z with this slope."""
-    if T_rig_camera is None:
-        return slope
-    below_m, ahead_m = _as_kitti(x, slope * z, z, T_rig_camera)
-    return below_m / ahead_m
+        size_px = (float(right) - float(left)) * px, (float(bottom) - float(top)) * px
+        away_m = math.hypot(float(x), float(z))
+        size_m = (float(length), float(w), float(h))
+        return cls(KINDS[kind], size_px, size_m, away_m, float(y), float(truncation))
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,15 +105,20 @@ class Picture:
     boxes: Grey = Grey()
     silhouettes: Grey = Grey()
 
+    @classmethod
+    def of(cls, rows: Sequence[str], px: float = 1.0) -> "Picture":
+        """The objects of label rows, whose pixels are ``px`` of KITTI's."""
+        found = (Labelled.of(row, px) for row in rows)
+        return cls(tuple(thing for thing in found if thing is not None))
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Camera:
-    """The first camera of a configuration with a size, its mounting, and its style of labels."""
+    """The first camera of a configuration with a size, and the style of its labels."""
 
     pipeline: Pipeline
     name: str
     style: Kitti
-    T_rig_camera: SE3 | None
 
     def look(self, accepted: AcceptedScene, number: int) -> tuple[list[str], ImageTruth, Pixels]:
         """Rows of the label file of a view, its truth, and its channels."""
@@ -159,40 +129,34 @@ class _Camera:
         return rows, truth, sample.capture.readings[self.name].channels
 
 
-def least_sizes(px: float) -> dict[str, int]:
-    """Fields of ``labels`` for a camera with that many pixels per pixel of KITTI's.
-
-    Annotators see angles, not pixels.
-    """
-    return {
-        "min_visible_px": max(1, int(LEAST_VISIBLE_PX * px**2)),
-        "min_box_px": max(1, int(LEAST_BOX_PX * px)),
-    }
+def as_kitti(camera: RgbCamera, shrunk: int) -> list[str]:
+    """Overrides that give a camera what KITTI's has, in an image smaller by a factor."""
+    fields = {"size_px": [side // shrunk for side in SIZE_PX], "hfov_deg": HFOV_DEG}
+    if camera.rig:
+        ahead_m, left_m, _ = camera.offset_m
+        fields |= {"offset_m": [ahead_m, left_m, HEIGHT_M], "yaw_deg": 0, "pitch_deg": 0}
+        fields |= {"roll_deg": 0}
+    return [f"sensors.{camera.name}.{name}={value}" for name, value in fields.items()]
 
 
 @contextmanager
-def _camera(
-    name: str, given: Sequence[str], kitti_px: float | None, channels: str
-) -> Iterator[_Camera]:
-    """The first camera of a configuration; a pixel is ``kitti_px`` of KITTI's, None = its own."""
+def _camera(name: str, given: Sequence[str], shrunk: int, channels: str) -> Iterator[_Camera]:
+    """The first camera of a configuration as KITTI's, its pictures smaller by a factor."""
     config = load_config(name, overrides=list(given))
-    camera: Any = next(s for s in config.sensors if hasattr(s, "size_px"))
-    own_px = camera.nominal_intrinsics().fx_px / FOCAL_PX
-    px = own_px if kitti_px is None else 1.0 / kitti_px
-    size_px = [round(px / own_px * side) for side in camera.size_px]
+    camera = next(s for s in config.sensors if isinstance(s, RgbCamera))
     changes = [
-        f"sensors.{camera.name}.size_px={size_px}",
+        *as_kitti(camera, shrunk),
         f"sensors.{camera.name}.channels=[{channels}]",
-        *(f"labels.{name}={least}" for name, least in least_sizes(px).items()),
+        f"labels.min_visible_px={16 // shrunk**2}",
+        f"labels.min_box_px={3 // shrunk}",
         "annotations=[boxes2d, boxes3d, visibility]",
         "exporters=[]",
         "steps_per_scene=1",
     ]
     kitti = next((e for e in config.exporters if isinstance(e, Kitti)), Kitti(far_m=64))
-    style = kitti.model_copy(update={"low_px": math.ceil(kitti.low_px * px)})
-    mounting = camera.T_rig_sensor if camera.rig else None
+    style = kitti.model_copy(update={"low_px": math.ceil(kitti.low_px / shrunk)})
     with open_pipeline(load_config(name, overrides=[*given, *changes])) as pipeline:
-        yield _Camera(pipeline, camera.name, style, mounting)
+        yield _Camera(pipeline, camera.name, style)
 
 
 def pictures_of_config(
@@ -205,7 +169,7 @@ def pictures_of_config(
     views = load_config(name, overrides=list(given)).general.views_per_scene
     with (
         _camera(name, given, SHRUNK, "instance, category") as small,
-        _camera(name, given, None, "rgb, instance, category") if light else nullcontext() as full,
+        _camera(name, given, 1, "rgb, instance, category") if light else nullcontext() as full,
     ):
         for scene in scenes:
             pictures = []
@@ -213,21 +177,12 @@ def pictures_of_config(
             again = None
             for number in range(views):
                 rows, truth, _ = small.look(accepted, number)
-                picture = _picture(rows, truth.camera.intrinsics, small.T_rig_camera)
+                picture = Picture.of(rows, FOCAL_PX / truth.camera.intrinsics.fx_px)
                 if full and any(thing.kind == "people" for thing in picture.objects):
                     again = again or full.pipeline.accepted_scene(scene)
                     picture = _with_light(picture, *full.look(again, number))
                 pictures.append(picture)
             yield pictures
-
-
-def _picture(
-    rows: Sequence[str], lens: Intrinsics | None = None, T_rig_camera: SE3 | None = None
-) -> Picture:
-    """Objects of label rows, of a picture with that lens and mounting or of KITTI's."""
-    focal_px, middle_px = (lens.fx_px, 0.5 * lens.height_px) if lens else (FOCAL_PX, 0.5 * ROWS)
-    found = (Labelled.of(row, focal_px, middle_px, T_rig_camera) for row in rows)
-    return Picture(tuple(thing for thing in found if thing is not None))
 
 
 def _with_light(
@@ -264,7 +219,7 @@ def pictures_of_kitti(folder: Path, n: int) -> Iterator[Picture]:
         rows = path.read_text().splitlines()
         image = folder / f"image_2/{path.stem}.png"
         grey = grey_levels(read_image(image)) if image.is_file() else None
-        picture = _picture(rows)
+        picture = Picture.of(rows)
         yield picture if grey is None else replace(picture, boxes=grey_in_boxes(grey, rows))
 
 

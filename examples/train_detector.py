@@ -2,14 +2,14 @@
 
     python examples/train_detector.py out/train --eval out/test/coco --save detector.pt
     python examples/train_detector.py tabletop.yaml --minutes 15 --eval photographs
-    python examples/train_detector.py recipe.yaml --eval photographs
+    python examples/train_detector.py recipe.yaml --eval photographs --pretrained
     python examples/train_detector.py --load detector.pt --eval photographs
 
 The source is a finished data set, or a recipe or configuration, which is rendered while training;
 only images of the split ``train`` are trained on. ``--eval`` is a folder with annotations in COCO's
 format (``annotations/*.json`` or ``*.json``, of which ``--split`` names one) and their images
 anywhere below it. Classes are matched by name. The result is COCO's AP with a 95 % confidence
-interval from bootstrapping over images.
+interval from bootstrapping over images. ``--load`` with a source trains that detector further.
 """
 
 import argparse
@@ -95,7 +95,13 @@ def batches_of_one_shape(pictures: Iterable[Target], size: int) -> Iterator[list
 def train(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Detector:
     """Train for ``--minutes`` or ``--steps``, whichever ends first."""
     torch.manual_seed(args.seed)
-    model = Detector(samples.categories, args.size, args.width)
+    if args.load is None:
+        model = Detector(samples.categories, args.size, args.width, pretrained=args.pretrained)
+    else:
+        model = Detector.load(args.load)
+        if model.classes != tuple(samples.categories):
+            raise SystemExit(f"{args.load} has the classes {', '.join(model.classes)}; the source "
+                             f"has {', '.join(samples.categories)}")  # fmt: skip
     started_s = time.monotonic()
 
     def used(step: int) -> float:
@@ -134,7 +140,10 @@ def parse_arguments() -> argparse.Namespace:
     """Arguments of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("source", nargs="?", help="configuration, recipe, or folder of a data set")
-    parser.add_argument("--load", type=Path, help="evaluate this detector instead of training one")
+    parser.add_argument("--load", type=Path, help="evaluate this detector, or train it further")
+    parser.add_argument(
+        "--pretrained", action="store_true", help="begin with features trained on photographs"
+    )
     parser.add_argument("--eval", type=Path, required=True, help="COCO-style folder")
     parser.add_argument("--split", default="", help="part of the name of the annotation file")
     parser.add_argument("--minutes", type=float, default=15.0, help="longest time of training")
@@ -149,8 +158,8 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--save", type=Path, help="write the detector here")
     parser.add_argument("--out", type=Path, help="also write the results as JSON here")
     args = parser.parse_args()
-    if (args.source is None) == (args.load is None):
-        parser.error("give either a source to train on, or --load")
+    if args.source is None and args.load is None:
+        parser.error("give a source to train on, or --load")
     return args
 
 
@@ -158,7 +167,7 @@ def main() -> None:
     """Train or load, evaluate, print."""
     args = parse_arguments()
     read_real(args.eval, args.split)  # a wrong folder fails before training
-    model = Detector.load(args.load) if args.load else train(open_source(args), args)
+    model = train(open_source(args), args) if args.source else Detector.load(args.load)
     if args.save is not None:
         model.save(args.save)
     summary = evaluate_on(model, args)

@@ -19,12 +19,10 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from gen_data.core.errors import ConfigError
+from gen_data.lab.study.pretrained import Features
 
 STRIDE = 4
 """Pixels of the network's input per place of its output."""
-
-COARSEST = 16
-"""Width and height of the input are multiples of this stride of the coarsest features."""
 
 SPREAD = 0.54 / 6.0
 """Standard deviation of a centre in the heat map, as a share of the box (TTFNet, section 4)."""
@@ -52,25 +50,53 @@ class Residual(nn.Module):
         return functional.relu(features + self.body(features))
 
 
+class Residuals(nn.Module):
+    """Residual network of 0.2 million parameters: features with strides of 4, 8 and 16 pixels.
+
+    Attributes:
+        channels: Of the features, from fine to coarse.
+    """
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        w = width
+        self.channels = w, 2 * w, 4 * w
+        self.fine = nn.Sequential(convolve(3, w // 2, 2), convolve(w // 2, w, 2), Residual(w))
+        self.middle = nn.Sequential(convolve(w, 2 * w, 2), *(Residual(2 * w) for _ in range(2)))
+        self.coarse = nn.Sequential(convolve(2 * w, 4 * w, 2), *(Residual(4 * w) for _ in range(3)))
+
+    def forward(self, images: Tensor) -> list[Tensor]:
+        """Features of images, from fine to coarse."""
+        fine = self.fine(images)
+        middle = self.middle(fine)
+        return [fine, middle, self.coarse(middle)]
+
+
 class Detector(nn.Module):
-    """Residual network with three scales, joined from coarse to fine; 0.3 million parameters.
+    """Features of several scales, joined from coarse to fine, and heads for centres and boxes.
 
     Args:
         classes: Names of the classes, in the order of their labels, which start at 1.
         size_px: Longest side of the images that it is trained on.
-        width: Channels of the finest scale.
+        width: Channels of the finest scale; the joined features have twice as many.
+        pretrained: Features of ``pretrained.Features``, trained on photographs, instead of
+            ``Residuals``.
+
+    Attributes:
+        coarsest_px: Stride of the coarsest features: width and height of the input are multiples.
     """
 
-    def __init__(self, classes: Sequence[str], size_px: int, width: int = 16) -> None:
+    def __init__(
+        self, classes: Sequence[str], size_px: int, width: int = 16, *, pretrained: bool = False
+    ) -> None:
         super().__init__()
-        self.classes, self.size_px = tuple(classes), size_px
-        w = width
-        self.fine = nn.Sequential(convolve(3, w // 2, 2), convolve(w // 2, w, 2), Residual(w))
-        self.middle = nn.Sequential(convolve(w, 2 * w, 2), *(Residual(2 * w) for _ in range(2)))
-        self.coarse = nn.Sequential(convolve(2 * w, 4 * w, 2), *(Residual(4 * w) for _ in range(3)))
-        self.from_coarse, self.from_middle = nn.Conv2d(4 * w, 2 * w, 1), nn.Conv2d(2 * w, 2 * w, 1)
-        self.from_fine = nn.Conv2d(w, 2 * w, 1)
-        self.join = convolve(2 * w, 2 * w)
+        self.classes, self.size_px, self.width = tuple(classes), size_px, width
+        self.pretrained = pretrained
+        self.features = Features() if pretrained else Residuals(width)
+        w, scales = width, self.features.channels
+        self.coarsest_px = STRIDE * 2 ** (len(scales) - 1)
+        self.laterals = nn.ModuleList(nn.Conv2d(channels, 2 * w, 1) for channels in scales)
+        self.joins = nn.ModuleList(convolve(2 * w, 2 * w) for _ in scales[2:])
         self.heat = nn.Sequential(convolve(2 * w, 2 * w), nn.Conv2d(2 * w, len(classes), 1))
         self.sides = nn.Sequential(convolve(2 * w, w), nn.Conv2d(w, 4, 1))
         # A centre is rare: its prior is 1 % (Lin et al., "Focal Loss", 2017, section 4.1).
@@ -81,37 +107,41 @@ class Detector(nn.Module):
         """Logits of the heat map, and boxes.
 
         Args:
-            images: float32 [b, 3, h, w] in [0, 1]; h and w are multiples of ``COARSEST``.
+            images: float32 [b, 3, h, w] in [0, 1]; h and w are multiples of ``coarsest_px``.
 
         Returns:
             Logits [b, classes, h/4, w/4] and boxes [b, 4, h/4, w/4] in pixels of the images.
         """
-        fine = self.fine(images)
-        middle = self.middle(fine)
-        up = functional.interpolate(self.from_coarse(self.coarse(middle)), size=middle.shape[-2:])
-        middle = self.join(self.from_middle(middle) + up)
-        up = functional.interpolate(middle, size=fine.shape[-2:])
-        features = functional.relu(self.from_fine(fine) + up)
-        distances = STRIDE * self.sides(features).clamp(max=6.0).exp()
-        rows = (torch.arange(fine.shape[-2]) + 0.5) * STRIDE
-        columns = (torch.arange(fine.shape[-1]) + 0.5) * STRIDE
+        joined, *finer = reversed(
+            [
+                lateral(scale)
+                for lateral, scale in zip(self.laterals, self.features(images), strict=True)
+            ]
+        )
+        joins = [*self.joins, functional.relu]
+        for scale, join in zip(finer, joins, strict=True):
+            joined = join(scale + functional.interpolate(joined, size=scale.shape[-2:]))
+        distances = STRIDE * self.sides(joined).clamp(max=6.0).exp()
+        rows = (torch.arange(joined.shape[-2]) + 0.5) * STRIDE
+        columns = (torch.arange(joined.shape[-1]) + 0.5) * STRIDE
         y, x = torch.meshgrid(rows, columns, indexing="ij")
         left, top, right, bottom = distances.unbind(1)
-        return self.heat(features), torch.stack([x - left, y - top, x + right, y + bottom], 1)
+        return self.heat(joined), torch.stack([x - left, y - top, x + right, y + bottom], 1)
 
     def save(self, path: Path) -> None:
         """Write weights and classes."""
-        width = self.from_fine.in_channels
-        content = {"classes": list(self.classes), "size_px": self.size_px, "width": width}
-        torch.save(content | {"weights": self.state_dict()}, path)
+        names = ("classes", "size_px", "width", "pretrained")
+        content = {name: getattr(self, name) for name in names}
+        torch.save(content | {"classes": list(self.classes), "weights": self.state_dict()}, path)
 
     @staticmethod
     def load(path: Path) -> "Detector":
         """Read a file of ``save``, ready to detect. Raises ConfigError if it is not such a file."""
         try:
             content = torch.load(path, weights_only=True)
-            model = Detector(content["classes"], content["size_px"], content["width"])
-            model.load_state_dict(content["weights"])
+            weights = content.pop("weights")
+            model = Detector(**content)
+            model.load_state_dict(weights)
         except (OSError, UnpicklingError, EOFError, LookupError, TypeError, RuntimeError) as error:
             reason = str(error).partition("\n")[0]
             raise ConfigError(
@@ -122,16 +152,16 @@ class Detector(nn.Module):
         return model
 
 
-def input_size(image: Image, size_px: int) -> tuple[int, int]:
+def input_size(image: Image, size_px: int, coarsest_px: int) -> tuple[int, int]:
     """Width and height of the network's input for an image [h, w, 3]: padded, same proportions."""
     height, width = image.shape[:2]
     scale = size_px / max(height, width)
-    across, down = (int(-(-scale * side // COARSEST)) * COARSEST for side in (width, height))
+    across, down = (int(-(-scale * side // coarsest_px)) * coarsest_px for side in (width, height))
     return across, down
 
 
 def augment(
-    image: Image, boxes: Floats, size_px: int, rng: np.random.Generator
+    image: Image, boxes: Floats, model: Detector, rng: np.random.Generator
 ) -> tuple[Image, Floats]:
     """Random scale, place, mirroring and colour of an image [h, w, 3] with boxes [n, 4].
 
@@ -139,9 +169,9 @@ def augment(
         The image in the size of the network's input, and its boxes, clipped; the box of an object
         with less than a third of it in the image is empty.
     """
-    across, down = input_size(image, size_px)
+    across, down = input_size(image, model.size_px, model.coarsest_px)
     height, width = image.shape[:2]
-    scale = size_px / max(height, width) * np.exp(rng.uniform(-0.2, 0.2))
+    scale = model.size_px / max(height, width) * np.exp(rng.uniform(-0.2, 0.2))
     shift = rng.uniform(0.0, 1.0, 2) * (across - scale * width, down - scale * height)
     matrix = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
     if rng.uniform() < 0.5:
@@ -274,7 +304,7 @@ def detect(
     Returns:
         Boxes [n, 4] in its pixels, scores [n] and labels [n] from 1, best first; at most ``most``.
     """
-    across, down = input_size(image, model.size_px)
+    across, down = input_size(image, model.size_px, model.coarsest_px)
     scale = model.size_px / max(image.shape[:2])
     filter_ = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=filter_)

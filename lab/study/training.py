@@ -64,7 +64,7 @@ def prepare(
     model: detector.Detector, image: NDArray[np.uint8], target: Arrays, rng: np.random.Generator
 ) -> tuple[torch.Tensor, detector.Truth]:
     """An augmented image [3, h, w] in [0, 1] and its truth."""
-    moved, boxes = detector.augment(image.transpose(1, 2, 0), target["boxes"], model.size_px, rng)
+    moved, boxes = detector.augment(image.transpose(1, 2, 0), target["boxes"], model, rng)
     shape = len(model.classes), moved.shape[0] // detector.STRIDE, moved.shape[1] // detector.STRIDE
     truth = detector.encode(boxes, target["labels"], target["iscrowd"] == 1, shape)
     return torch.from_numpy(moved).permute(2, 0, 1).float() / 255.0, truth

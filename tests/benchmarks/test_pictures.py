@@ -12,13 +12,15 @@ from benchmarks.bench_pictures import (
     REAL,
     Grey,
     Labelled,
+    as_kitti,
     grey_in_boxes,
     grey_levels,
-    least_sizes,
     pictures_of_kitti,
     summarise,
 )
-from gen_data.core.se3 import turned
+from gen_data.assemble.config import load_config
+from gen_data.core.se3 import SE3
+from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 ROWS = """\
 Car 0.00 0 0.00 100.00 150.00 160.00 190.00 1.50 1.60 4.00 3.00 1.70 4.00 0.00
@@ -46,47 +48,6 @@ def test_figures_of_label_files_are_those_of_a_count_by_hand(tmp_path: Path) -> 
     assert figures["cars: length, p50 [m]"] == pytest.approx(3.5)
     assert math.isnan(figures["people: mean grey in boxes"])
     assert set(figures) == set(REAL)
-
-
-def test_ground_below_cars_is_counted_from_a_level_camera_in_the_height_of_kitti_s() -> None:
-    """On level ground, 40 m ahead of a camera at 1.5 m that looks 0.5 degrees down: 1.65 m."""
-    down = math.radians(0.5)
-    T_rig_camera = turned((1.7, 0.0, 1.5), 0.0, -down, 0.0)
-    y = 1.5 * math.cos(down) - 40.0 * math.sin(down)
-    z = 40.0 * math.cos(down) + 1.5 * math.sin(down)
-    row = f"Car 0 0 0 100 150 160 190 1.5 1.6 4 -3 {y} {z} 0"
-
-    as_seen = Labelled.of(row, FOCAL_PX, 187.5)
-    as_kitti = Labelled.of(row, FOCAL_PX, 187.5, T_rig_camera)
-
-    assert as_seen is not None
-    assert as_seen.below_m == pytest.approx(1.151, abs=1e-3)
-    assert as_kitti is not None
-    assert as_kitti.below_m == pytest.approx(1.65, abs=1e-9)
-
-
-def test_near_cars_are_cut_off_where_the_image_of_kitti_ends() -> None:
-    """Four metres ahead of a camera at 1.2 m; its image is higher than KITTI's.
-
-    From 1.65 m the car's top of 1.56 m is 16 px below the middle, 187.5 px above the lowest row.
-    """
-    near = "Car 0 0 0 100 {} 400 {} 1.56 1.6 4 1 1.2 4 0"
-    row = near.format(450 - 1443 * (1.56 - 1.2) / 4, 450 + 1443 * 1.2 / 4)
-
-    car = Labelled.of(row, 1443.0, 450.0, turned((1.7, 0.0, 1.2), 0.0, 0.0, 0.0))
-
-    assert car is not None
-    assert car.size_px == pytest.approx((150.0, 187.5 - 721.5 * 0.09 / 4))
-
-
-@pytest.mark.parametrize(
-    ("px", "visible_px", "side_px"), [(1.0, 16, 3), (1.0 / 3.0, 1, 1), (1266.0 / 721.5, 49, 5)]
-)
-def test_least_sizes_of_labels_are_the_same_angles_under_every_lens(
-    px: float, visible_px: int, side_px: int
-) -> None:
-    """KITTI's camera, a third of its size, and the front camera of nuScenes."""
-    assert least_sizes(px) == {"min_visible_px": visible_px, "min_box_px": side_px}
 
 
 def test_grey_levels_are_of_pixels_in_boxes_of_people_each_counted_once() -> None:
@@ -118,16 +79,23 @@ def test_the_greys_of_real_pictures_are_read_next_to_their_labels(tmp_path: Path
     assert figures["people: dark pixels in boxes"] == 0.0
 
 
-@pytest.mark.parametrize(
-    ("top", "bottom", "height_px"),
-    [(100.0, 400.0, 275.0), (200.0, 300.0, 100.0), (380.0, 600.0, None)],
-)
-def test_boxes_end_where_the_images_of_kitti_do(
-    top: float, bottom: float, height_px: float | None
-) -> None:
-    """375 rows around row 187.5 end at 375; here everything is twice as large and 200 px lower."""
-    row = f"Car 0 0 0 0.0 {2 * top + 200} 60.0 {2 * bottom + 200} 1.5 1.6 4.0 3 1.7 4 0"
+def test_boxes_of_small_pictures_are_in_the_pixels_of_kitti_s_camera() -> None:
+    """A third of its size: 20 x 30 pixels are 60 x 90."""
+    found = Labelled.of("Car 0 0 0 10.0 20.0 30.0 50.0 1.5 1.6 4.0 3 1.7 4 0", 3.0)
 
-    found = Labelled.of(row, 2 * FOCAL_PX, 2 * 187.5 + 200)
+    assert found is not None
+    assert found.size_px == (60.0, 90.0)
 
-    assert (None if found is None else found.size_px[1]) == height_px
+
+@pytest.mark.parametrize("name", ["street.yaml", "kitti_rig.yaml", "nuscenes_rig.yaml"])
+def test_every_configuration_is_counted_as_kitti_s_camera_would_see_it(name: str) -> None:
+    """Focal length and field of view of P_rect_02, 1.65 m above the ground, level, straight on."""
+    camera = next(s for s in load_config(name).sensors if isinstance(s, RgbCamera))
+    config = load_config(name, overrides=as_kitti(camera, 3))
+    seen = next(s for s in config.sensors if isinstance(s, RgbCamera))
+
+    assert seen.size_px == (414, 125)
+    assert 3.0 * seen.nominal_intrinsics().fx_px == pytest.approx(FOCAL_PX, abs=0.5)
+    assert (seen.offset_m[:2], seen.image_pipeline) == (camera.offset_m[:2], camera.image_pipeline)
+    if camera.rig:
+        assert seen.T_rig_sensor == SE3((*camera.offset_m[:2], 1.65))
