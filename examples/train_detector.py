@@ -31,8 +31,8 @@ from gen_data.lab.study.training import detect_all, fit
 from gen_data.runner.recipe import is_recipe
 from gen_data.targets import detection_target
 
-KEPT_MAX = 4000
-"""Most samples of a data set that are kept in memory."""
+KEPT_BYTES = 2e9
+"""Largest images of a data set, together, that are kept in memory."""
 
 
 def open_source(args: argparse.Namespace) -> gen_data.SampleSequence:
@@ -68,14 +68,14 @@ def read_targets(samples: gen_data.SampleSequence, args: argparse.Namespace) -> 
         samples, targets_of_cameras, batch_size=args.batch, shuffle=True, seed=args.seed,
         workers=args.workers, **epoch,
     )  # fmt: skip
-    is_small = samples.is_bounded and len(samples) <= KEPT_MAX
     rng = np.random.default_rng(args.seed)
+    left_bytes = KEPT_BYTES if samples.is_bounded else -1.0
     seen: list[Target] = []
-    while not (is_small and seen):
+    while left_bytes < 0.0 or not seen:
         for batch in loader:
             pictures = [picture for sample in batch for picture in sample]
-            if is_small:
-                seen += pictures
+            left_bytes -= sum(image.nbytes for image, _ in pictures)
+            seen = seen + pictures if left_bytes >= 0.0 else []
             yield from pictures
     while True:
         yield from (seen[number] for number in rng.permutation(len(seen)))

@@ -27,6 +27,12 @@ STRIDE = 4
 SPREAD = 0.54 / 6.0
 """Standard deviation of a centre in the heat map, as a share of the box (TTFNet, section 4)."""
 
+PRETRAINED_RATE = 0.3
+"""Learning rate of pretrained features, as a share of the others'."""
+
+SAME_OBJECT_IOU = 0.7
+"""Intersection over union above which detections of a class are of one object."""
+
 Floats = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
@@ -127,6 +133,13 @@ class Detector(nn.Module):
         y, x = torch.meshgrid(rows, columns, indexing="ij")
         left, top, right, bottom = distances.unbind(1)
         return self.heat(joined), torch.stack([x - left, y - top, x + right, y + bottom], 1)
+
+    def parameter_groups(self, rate: float) -> list[dict[str, Any]]:
+        """Groups for an optimiser; features that were trained before learn more slowly."""
+        features = [p for p in self.features.parameters() if p.requires_grad]
+        others = [p for name, p in self.named_parameters() if not name.startswith("features.")]
+        slower = PRETRAINED_RATE if self.pretrained else 1.0
+        return [{"params": features, "lr": slower * rate}, {"params": others, "lr": rate}]
 
     def save(self, path: Path) -> None:
         """Write weights and classes."""
@@ -319,4 +332,8 @@ def detect(
     found = boxes[0].flatten(1)[:, cells].T / scale
     found[:, 0::2].clamp_(0.0, image.shape[1])
     found[:, 1::2].clamp_(0.0, image.shape[0])
-    return found.numpy(), scores.numpy(), labels.numpy() + 1
+    # Large objects have several peaks.
+    sides = torch.cat([found[:, :2], found[:, 2:] - found[:, :2]], 1).numpy()
+    kept = cv2.dnn.NMSBoxesBatched(sides, scores.numpy(), labels.numpy(), 0.0, SAME_OBJECT_IOU)
+    best = np.sort(np.asarray(kept, np.int64))
+    return found.numpy()[best], scores.numpy()[best], labels.numpy()[best] + 1

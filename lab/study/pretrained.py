@@ -45,6 +45,7 @@ class Features(nn.Module):
         self.blocks = network._blocks
         for part in (self.stem, *self.blocks[:FROZEN]):
             part.requires_grad_(requires_grad=False)
+        self.train()
 
     def train(self, mode: bool = True) -> "Features":
         """Frozen parts keep the means and variances of photographs, too."""

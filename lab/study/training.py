@@ -38,15 +38,18 @@ def fit(
         report: Called with number and loss of every twentieth step.
     """
     rng = Streams(seed, 0).rng("study/augmentation")
+    model.train()
     model.to(memory_format=torch.channels_last)
-    optimizer = torch.optim.AdamW(model.parameters(), lr=PEAK_RATE, weight_decay=0.01)
+    optimizer = torch.optim.AdamW(model.parameter_groups(PEAK_RATE), weight_decay=0.01)
+    peaks = [group["lr"] for group in optimizer.param_groups]
     for step, batch in enumerate(batches):
         share = used(step)
         if share >= 1.0:
             break
         # One cycle: a short warm-up, then a cosine down to zero.
         rate = min(1.0, (step + 1) / 50) * 0.5 * (1.0 + np.cos(np.pi * share))
-        optimizer.param_groups[0]["lr"] = PEAK_RATE * rate
+        for group, peak in zip(optimizer.param_groups, peaks, strict=True):
+            group["lr"] = peak * rate
         images, truths = zip(*(prepare(model, *pair, rng) for pair in batch), strict=True)
         logits, boxes = model(torch.stack(images))
         loss = detector.compute_loss(logits, boxes, truths)
