@@ -126,12 +126,12 @@ def _make_lane(road: Road, index: int, section: Section, number: int, T_body_fil
     lift = np.full(len(course.s_m), 0.5 * sum(heights_m(record)))
     points = road.points(section, course.s_m, 0.5 * (course.inner_m + course.outer_m), lift)
     low_m, high_m = heights_m(record)
-    inner = road.points(section, course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2]
-    outer = road.points(section, course.s_m, course.outer_m, np.full(len(lift), high_m))[:, 2]
-    widths_m = np.abs(course.outer_m - course.inner_m)
+    inner = road.points(section, course.s_m, course.inner_m, np.full(len(lift), low_m))
+    outer = road.points(section, course.s_m, course.outer_m, np.full(len(lift), high_m))
+    widths_m = np.linalg.norm((outer - inner)[:, :2], axis=1)
     # Lanes with negative numbers have their inner edge on the left, seen along the road.
     forward = runs_forward(road, record)
-    fall = (inner - outer) * (1.0 if (number < 0) == forward else -1.0)
+    fall = (inner - outer)[:, 2] * (1.0 if (number < 0) == forward else -1.0)
     width_m = round(float(widths_m.mean()), 6)
     bank = float(fall.mean()) / width_m if width_m else 0.0
     banks = fall / np.maximum(widths_m, _NARROW_M)

@@ -1,5 +1,6 @@
 """Records of OpenDRIVE files that change along a road, and newer elements of the standard."""
 
+import cmath
 import math
 from pathlib import Path
 
@@ -252,11 +253,22 @@ def test_crossfall_falls_from_the_reference_line(side: str, left: bool, right: b
     assert z_m(crossfall(side), -1) == pytest.approx(fall * right, abs=1e-6)
 
 
-def test_crossfall_adds_to_superelevation() -> None:
-    """A road that rises to its left, with a roof on top."""
-    bank = '<superelevation s="0" a="0.02" b="0" c="0" d="0"/>'
-    expected = 1.75 * (math.tan(0.02) - math.tan(0.05))
-    assert z_m(bank + crossfall("both"), 1) == pytest.approx(expected, abs=1e-6)
+@pytest.mark.parametrize("roll", [0.02, -0.7])
+def test_superelevation_rolls_the_cross_section(roll: float) -> None:
+    """Lanes of 3.5 m, with a roof on top, as points of a plane that turns about the line.
+
+    A vector along the road is (t, -|t| tan 0.05) across and up, before its rotation by the roll.
+    """
+    bank = f'<superelevation s="0" a="{roll}" b="0" c="0" d="0"/>'
+    found = lanes(road(lane(1) + lane(2), lane(-1), lateral=bank + crossfall("both")))
+    for name, t in (("1.0.1", 1.75), ("1.0.2", 5.25), ("1.0.-1", -1.75)):
+        up = -abs(t) * math.tan(0.05)
+        _, y, z = found[name].center_m[0]
+        expected = (t + 1j * up) * cmath.exp(1j * roll)
+        assert (y, z) == pytest.approx((expected.real, expected.imag), abs=1e-5)
+        fall = math.copysign(math.tan(0.05), t)
+        across = 3.5 * (1 - 1j * fall) * cmath.exp(1j * roll)
+        assert found[name].width_m == pytest.approx(across.real, abs=1e-5)
 
 
 SHAPE = (
@@ -294,9 +306,9 @@ def test_the_surface_follows_the_shape_within_a_lane() -> None:
 def test_level_lanes_keep_the_height_of_their_inner_edge() -> None:
     """A sidewalk beyond a road that leans."""
     bank = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
-    assert z_m(bank, 2, 'level="true"') == pytest.approx(3.5 * math.tan(0.1), abs=1e-6)
-    assert z_m(bank, -2, 'level="true"') == pytest.approx(-3.5 * math.tan(0.1), abs=1e-6)
-    assert z_m(bank, 2, 'level="false"') == pytest.approx(5.25 * math.tan(0.1), abs=1e-6)
+    assert z_m(bank, 2, 'level="true"') == pytest.approx(3.5 * math.sin(0.1), abs=1e-6)
+    assert z_m(bank, -2, 'level="true"') == pytest.approx(-3.5 * math.sin(0.1), abs=1e-6)
+    assert z_m(bank, 2, 'level="false"') == pytest.approx(5.25 * math.sin(0.1), abs=1e-6)
 
 
 # --- lanes ---
@@ -467,7 +479,7 @@ def test_sidewalks_that_meet_head_on_lead_nowhere() -> None:
 def test_borders_follow_lanes_that_widen_shift_and_twist(rule: str) -> None:
     """Closed forms of the file: a taper beside an offset, on a superelevation that grows.
 
-    At s the offset is 0.02 s, the width 1 + 0.02 s, and the slope of the road tan(0.0005 s).
+    At s the offset is 0.02 s, the width 1 + 0.02 s, and the road is rolled by 0.0005 s.
     """
     wide = '<width sOffset="0" a="1" b="0.02" c="0" d="0"/>'
     twist = '<superelevation s="0" a="0" b="0.0005" c="0" d="0"/>'
@@ -488,8 +500,8 @@ def test_borders_follow_lanes_that_widen_shift_and_twist(rule: str) -> None:
         line = np.array(border_line(one, "left" if is_upper == runs_east else "right"))
         s = line[:, 0] + 50.0
         t = slope * s + middle_m
-        assert line[:, 1] == pytest.approx(t, abs=2e-3)
-        assert line[:, 2] == pytest.approx(t * np.tan(0.0005 * s), abs=2e-3)
+        assert line[:, 1] == pytest.approx(t * np.cos(0.0005 * s), abs=2e-3)
+        assert line[:, 2] == pytest.approx(t * np.sin(0.0005 * s), abs=2e-3)
 
 
 def test_borders_and_surface_bend_where_a_record_begins() -> None:
