@@ -136,6 +136,15 @@ def test_paint_has_the_colour_of_the_file(color: str, yellow: bool) -> None:
     assert (red > 2.0 * blue) == yellow
 
 
+def test_marks_in_a_junction_and_the_place_on_the_globe_are_named() -> None:
+    """Ways through a junction overlap: their marks are not painted."""
+    head = "<header><geoReference>+proj=utm +zone=32</geoReference></header>"
+    none = '<roadMark sOffset="50" type="none"/>'
+    way = road(right=lane(-1, WIDTH + SOLID + none)).replace('junction="-1"', 'junction="9"')
+    network = read_opendrive(text(way, more=head + '<junction id="9"/>'), "a.xodr")
+    assert network.unused == {"geoReference of header": 1, "roadMark in a junction": 1}
+
+
 def test_marks_that_are_painted_otherwise_are_named() -> None:
     marks = "".join(
         f'<roadMark sOffset="{k}" type="{kind}" color="{color}"/>'
