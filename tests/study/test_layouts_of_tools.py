@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from gen_data.core.errors import StorageError
+from gen_data.core.errors import ConfigError, StorageError
 from gen_data.lab.matching.label_files import RealObject
 from gen_data.lab.matching.real_files import find_files
 from gen_data.lab.study.real_pictures import read_real
@@ -162,6 +162,11 @@ def test_images_of_linked_folders_are_read_once(tmp_path: Path) -> None:
     (real / "again").symlink_to(real, target_is_directory=True)
     assert found(real) == {"images/1.png": 1}
     assert find_files(real).photos == (real / "images/1.png",)
+
+
+def test_a_missing_folder_has_no_labels(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"there are no labels; expected"):
+        read_real(tmp_path / "gone")
 
 
 VOC = (
