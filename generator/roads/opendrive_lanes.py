@@ -68,14 +68,18 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
     T_body_file = se3.SE3((-x, -y, 0.0))
     made: dict[Key, Lane] = {}
     extra: list[Lane] = []
+    narrow: set[Key] = set()
     for road in network.roads.values():
         for index, section in enumerate(road.sections):
             for number in sorted(section.lanes):
                 kind = KINDS.get(section.lanes[number].kind)
-                if number != 0 and kind is not None:
-                    made[road.road_id, index, number] = _make_lane(
-                        road, index, section, number, T_body_file
-                    )
+                if number == 0 or kind is None:
+                    continue
+                lane = _make_lane(road, index, section, number, T_body_file)
+                if max(lane.widths_m or (lane.width_m,)) < TAPERED_M:
+                    narrow.add((road.road_id, index, number))
+                else:
+                    made[road.road_id, index, number] = lane
             extra += _make_side_lanes(road, index, section, T_body_file)
     linked = []
     for key, lane in made.items():
@@ -89,7 +93,7 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
             after = [k for k in after if _gap_m(lane, made[k]) <= MAX_LINK_GAP_M]
         for other in after:
             _check_gap(network, key, lane, made[other])
-        linked.append(_link_lane(network, lane, key, after, made))
+        linked.append(_link_lane(network, lane, key, after, made, narrow))
     return (*linked, *extra)
 
 
@@ -198,9 +202,14 @@ def _lane_name(key: Key) -> str:
 
 
 def _link_lane(
-    network: Network, lane: Lane, key: Key, after: list[Key], made: dict[Key, Lane]
+    network: Network,
+    lane: Lane,
+    key: Key,
+    after: list[Key],
+    made: dict[Key, Lane],
+    narrow: set[Key],
 ) -> Lane:
-    """Add successors, and adjacent lanes of the same kind, to a lane."""
+    """Add successors, and adjacent lanes of the same kind, to a lane; narrow ones are passed."""
     road, section, number = key
     side = 1 if number > 0 else -1
     lanes = network.roads[road].sections[section].lanes
@@ -208,9 +217,11 @@ def _link_lane(
 
     def beside(step: int) -> str:
         other = (road, section, number + step)
+        while other in narrow:
+            other = (road, section, other[2] + step)
         if other not in made or made[other].kind != lane.kind:
             return ""
-        alike = runs_forward(network.roads[road], lanes[number + step]) == forward
+        alike = runs_forward(network.roads[road], lanes[other[2]]) == forward
         return _lane_name(other) if alike else ""
 
     # The centre lies at -side in t; left is +t for traffic along the road.

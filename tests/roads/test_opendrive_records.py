@@ -11,8 +11,9 @@ from gen_data.assets.checking import check_folder
 from gen_data.assets.library import open_library
 from gen_data.content.roads.network_surface import network_solid
 from gen_data.core.errors import AssetError
-from gen_data.core.lane_geometry import border_line
+from gen_data.core.lane_geometry import border_line, lane_borders
 from gen_data.core.scene import Lane
+from gen_data.exporters.road_map import lane_area
 from gen_data.roads.opendrive import read_opendrive
 from gen_data.roads.opendrive_lanes import network_lanes
 
@@ -525,3 +526,48 @@ def test_borders_and_surface_bend_where_a_record_begins() -> None:
     asphalt = network_solid(read_opendrive(text(made), "a.xodr")).mesh.vertices_m[:, :2]
     corners = np.round(asphalt.astype(float), 4).tolist()
     assert {(-16.9, -3.0), (3.1, -5.0)} <= set(map(tuple, corners))
+
+
+def tapered(*widths: tuple[float, float, float]) -> str:
+    return "".join(f'<width sOffset="{s}" a="{a}" b="{b}" c="0" d="0"/>' for s, a, b in widths)
+
+
+def border_spans(found: dict[str, Lane]) -> set[tuple[str, str, int, int]]:
+    """Borders: name, kind, and where they begin and end along the road, in whole metres."""
+    spans: set[tuple[str, str, int, int]] = set()
+    for border in lane_borders(tuple(found.values())):
+        low, high = sorted(round(border.points_m[k][0] + 50.0) for k in (0, -1))
+        spans.add((border.name, border.kind, low, high))
+    return spans
+
+
+def test_a_lane_without_width_has_one_border() -> None:
+    """A lane of no width up to 40 m, which is 3 m wide from 70 m on, outside and inside another.
+
+    At stations of 2 m it is 0.2 m wide at 42 m and 0.4 m at 44 m.
+    """
+    opens = tapered((0, 0, 0), (40, 0, 0.1), (70, 3, 0))
+    outside = lanes(road(right=lane(-1) + lane(-2, opens)))
+    assert border_spans(outside) == {
+        ("1.0.-1:left", "edge", 0, 100),
+        ("1.0.-2:left", "lane", 42, 100),
+        ("1.0.-2:right", "edge", 0, 100),
+    }
+    inside = lanes(road(right=lane(-1, opens) + lane(-2)))
+    assert border_spans(inside) == {
+        ("1.0.-1:left", "edge", 0, 100),
+        ("1.0.-2:left", "lane", 42, 100),
+        ("1.0.-2:right", "edge", 0, 100),
+    }
+    outline = lane_area([outside["1.0.-2"]]).exterior
+    assert len(np.unique(outline.round(6), axis=0)) == len(outline) - 1  # closed at its tip
+    following = np.roll(outline, -1, axis=0)
+    twice_m2 = (outline[:, 0] * following[:, 1] - outline[:, 1] * following[:, 0]).sum()
+    assert abs(twice_m2) / 2 == pytest.approx(30 * 3 / 2 + 30 * 3, abs=0.1)
+
+
+def test_a_lane_that_has_no_width_anywhere_is_none() -> None:
+    """The lanes on both sides of it are neighbours."""
+    found = lanes(road(right=lane(-1) + lane(-2, tapered((0, 0, 0))) + lane(-3)))
+    assert {"1.0.-1", "1.0.-3"} == {name for name in found if found[name].kind == "driving"}
+    assert (found["1.0.-1"].right, found["1.0.-3"].left) == ("1.0.-3", "1.0.-1")
