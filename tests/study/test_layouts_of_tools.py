@@ -58,6 +58,16 @@ def test_cocos_splits_keep_apart_images_of_one_name(label: str, image: str, tmp_
     }
 
 
+def test_a_split_may_be_a_folder(tmp_path: Path) -> None:
+    """The validation set judges, if no split is given."""
+    for split in ("train", "valid"):
+        coco(tmp_path / split / "_annotations.coco.json", {"bbox": [1, 1, 5, 5]})
+        write_picture(tmp_path / split / "1.png")
+    for asked, split in (("", "valid"), ("train", "train")):
+        (picture,) = read_real(tmp_path, asked).pictures
+        assert picture.path == tmp_path / split / "1.png"
+
+
 def test_an_image_name_of_several_files_is_counted_and_not_guessed(tmp_path: Path) -> None:
     coco(tmp_path / "labels.json", {"bbox": [1, 1, 5, 5]})
     for folder in ("first", "second"):
