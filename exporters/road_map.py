@@ -225,6 +225,11 @@ def find_paint(scene: Scene, assets: AssetLibrary) -> "PaintIndex":
 def lane_area(lanes: Sequence[Lane]) -> Area:
     """Area between the left border of the first and the right border of the last lane."""
     left, right = border_line(lanes[0], "left"), border_line(lanes[-1], "right")
+    if len(lanes) == 1 and lanes[0].widths_m:
+        # Where a lane begins or ends without width, its outline would touch itself.
+        wide = np.flatnonzero(half_widths_m(lanes[0]) > 10.0**-DECIMALS)
+        low, high = max(int(wide[0]) - 1, 0), int(wide[-1]) + 2
+        left, right = left[low:high], right[low:high]
     return Area(np.array([*right, *reversed(left)])[:, :2])
 
 

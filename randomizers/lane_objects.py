@@ -174,7 +174,10 @@ class LaneObjects(GroupRandomizer):
             for _ in range(PER_LANE_MAX):
                 asset, scale, bounds_m, solid_m = run.thing
                 length_m, width_m = _extent_m(bounds_m, group.facing)
-                room_m = max(0.0, line.half_width_m(at_m + 0.5 * length_m) - 0.5 * width_m)
+                free_m = line.half_width_m(at_m + 0.5 * length_m) - 0.5 * width_m
+                # Lanes that taper have no width where they begin or end.
+                fits = free_m >= 0.0 or not line.lane.widths_m
+                room_m = max(0.0, free_m)
                 left_m = room_m * self.lateral.draw(rng)
                 behind_m = self.behind_m.draw(rng)
                 turn = math.radians(self.yaw_deg.draw(rng))
@@ -182,7 +185,7 @@ class LaneObjects(GroupRandomizer):
                 used = run.used if run.used is not None else self.occupancy.draw(rng)
                 if at_m + length_m > line.length_m:
                     break
-                if used:
+                if used and fits:
                     place = line.pose(at_m + 0.5 * length_m, left_m - behind_m)
                     place = place @ SE3((0.0, 0.0, -_land_fall_m(behind_m)))
                     pose = pose_on_lane(place, line.lane, bounds_m, group.facing, turn)

@@ -37,7 +37,7 @@ from gen_data.roads import opendrive, opendrive_lanes
 
 VERSION = 10
 """Increased whenever the same files are imported as different geometry."""
-ROADS_VERSION = 2
+ROADS_VERSION = 4
 """The same for road networks."""
 SIZE_TOLERANCE = 0.05
 """Largest deviation of a mesh's edges from the stated ones, as a share of the longest edge."""

@@ -93,7 +93,8 @@ class LaneBorder:
     """The line at one side of driving lanes, painted or not.
 
     Attributes:
-        name: Lane and side that it belongs to: ``main/forward0:left``.
+        name: Lane and side that it belongs to: ``main/forward0:left``; further parts of a line
+            that is cut where a lane has no width end in ``/1``, ``/2``, ...
         kind: ``lane``: between lanes of the same direction; ``road``: between lanes of opposite
             directions; ``edge``: the edge of the carriageway.
         points_m: World, on the ground, in the direction of travel of the lane it is named by.
@@ -112,6 +113,7 @@ def lane_borders(lanes: tuple[Lane, ...]) -> tuple[LaneBorder, ...]:
 def _find_borders(lanes: tuple[Lane, ...]) -> tuple[LaneBorder, ...]:
     driving = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]
     borders: list[LaneBorder] = []
+    named = {lane.name: lane for lane in driving}
     alone: dict[Side, list[tuple[Vec3, Vec3]]] = {"left": [], "right": []}
     for lane in driving:
         for side in SIDES:
@@ -127,8 +129,27 @@ def _find_borders(lanes: tuple[Lane, ...]) -> tuple[LaneBorder, ...]:
                 alone[side].append((line[0], line[-1]))
                 if _is_met(lane, driving, side, ends):
                     kind = "road"
-            borders.append(LaneBorder(f"{lane.name}:{side}", kind, line))
+            parts = [line] if kind != "lane" else _parts_between(named.get(lane.left), lane, line)
+            names = (f"{lane.name}:{side}" + (f"/{k}" if k else "") for k in range(len(parts)))
+            borders += (LaneBorder(n, kind, part) for n, part in zip(names, parts, strict=True))
     return tuple(borders)
+
+
+def _parts_between(
+    left: Lane | None, right: Lane, line: tuple[Vec3, ...]
+) -> list[tuple[Vec3, ...]]:
+    """Parts of the line between two lanes where it is no other border of a lane without width.
+
+    Such a lane's outer border is the edge of the next one; between two others it has none.
+    """
+    if left is None or not (left.widths_m or right.widths_m):
+        return [line]
+    gone = (half_widths_m(right) < 0.5 * MEETING_M) & (not right.right)
+    if len(left.center_m) == len(line):
+        gone = gone | (half_widths_m(left) < 0.5 * MEETING_M)
+    steps = ~(gone[:-1] & gone[1:])
+    ends = np.flatnonzero(np.diff(steps, prepend=False, append=False))
+    return [line[a : b + 1] for a, b in ends.reshape(-1, 2).tolist()]
 
 
 def border_line(lane: Lane, side: Side) -> tuple[Vec3, ...]:

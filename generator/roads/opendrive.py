@@ -258,17 +258,23 @@ class Road:
         return edges
 
     def points(self, section: Section, s_m: Array, t_m: Array, lift_m: Array) -> Array:
-        """Points [n, 3] at arc lengths, distances to the left and heights over the road."""
-        flat = self.line.points(s_m, t_m)
+        """Points [n, 3] at arc lengths, distances to the left and heights over the road.
+
+        The superelevation rolls the whole cross section about the reference line: distances to
+        the left are measured along the road's surface. ``lift_m`` is upright.
+        """
         banked_m = self._within_level(section, s_m, t_m)
-        z = self.elevation_m(s_m) + banked_m * np.tan(self.superelevation_rad(s_m)) + lift_m
+        height_m = np.zeros_like(banked_m)
         left, right = self.crossfall_rad
         if left.pieces or right.pieces:
             fall = np.where(banked_m > 0.0, left(s_m), right(s_m))
-            z = z - np.abs(banked_m) * np.tan(fall)
+            height_m = height_m - np.abs(banked_m) * np.tan(fall)
         if self.shape_m.stations:
-            z = z + self.shape_m(s_m, banked_m)
-        return np.column_stack([flat, z])
+            height_m = height_m + self.shape_m(s_m, banked_m)
+        roll = self.superelevation_rad(s_m)
+        aside_m = banked_m * np.cos(roll) - height_m * np.sin(roll) + (t_m - banked_m)
+        z = self.elevation_m(s_m) + banked_m * np.sin(roll) + height_m * np.cos(roll) + lift_m
+        return np.column_stack([self.line.points(s_m, aside_m), z])
 
     def _within_level(self, section: Section, s_m: Array, t_m: Array) -> Array:
         """``t`` [n] at which the lateral profile ends: level lanes keep the height there."""

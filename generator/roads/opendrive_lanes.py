@@ -68,14 +68,18 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
     T_body_file = se3.SE3((-x, -y, 0.0))
     made: dict[Key, Lane] = {}
     extra: list[Lane] = []
+    narrow: set[Key] = set()
     for road in network.roads.values():
         for index, section in enumerate(road.sections):
             for number in sorted(section.lanes):
                 kind = KINDS.get(section.lanes[number].kind)
-                if number != 0 and kind is not None:
-                    made[road.road_id, index, number] = _make_lane(
-                        road, index, section, number, T_body_file
-                    )
+                if number == 0 or kind is None:
+                    continue
+                lane = _make_lane(road, index, section, number, T_body_file)
+                if max(lane.widths_m or (lane.width_m,)) < TAPERED_M:
+                    narrow.add((road.road_id, index, number))
+                else:
+                    made[road.road_id, index, number] = lane
             extra += _make_side_lanes(road, index, section, T_body_file)
     linked = []
     for key, lane in made.items():
@@ -89,7 +93,7 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
             after = [k for k in after if _gap_m(lane, made[k]) <= MAX_LINK_GAP_M]
         for other in after:
             _check_gap(network, key, lane, made[other])
-        linked.append(_link_lane(network, lane, key, after, made))
+        linked.append(_link_lane(network, lane, key, after, made, narrow))
     return (*linked, *extra)
 
 
@@ -126,12 +130,12 @@ def _make_lane(road: Road, index: int, section: Section, number: int, T_body_fil
     lift = np.full(len(course.s_m), 0.5 * sum(heights_m(record)))
     points = road.points(section, course.s_m, 0.5 * (course.inner_m + course.outer_m), lift)
     low_m, high_m = heights_m(record)
-    inner = road.points(section, course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2]
-    outer = road.points(section, course.s_m, course.outer_m, np.full(len(lift), high_m))[:, 2]
-    widths_m = np.abs(course.outer_m - course.inner_m)
+    inner = road.points(section, course.s_m, course.inner_m, np.full(len(lift), low_m))
+    outer = road.points(section, course.s_m, course.outer_m, np.full(len(lift), high_m))
+    widths_m = np.linalg.norm((outer - inner)[:, :2], axis=1)
     # Lanes with negative numbers have their inner edge on the left, seen along the road.
     forward = runs_forward(road, record)
-    fall = (inner - outer) * (1.0 if (number < 0) == forward else -1.0)
+    fall = (inner - outer)[:, 2] * (1.0 if (number < 0) == forward else -1.0)
     width_m = round(float(widths_m.mean()), 6)
     bank = float(fall.mean()) / width_m if width_m else 0.0
     banks = fall / np.maximum(widths_m, _NARROW_M)
@@ -198,9 +202,14 @@ def _lane_name(key: Key) -> str:
 
 
 def _link_lane(
-    network: Network, lane: Lane, key: Key, after: list[Key], made: dict[Key, Lane]
+    network: Network,
+    lane: Lane,
+    key: Key,
+    after: list[Key],
+    made: dict[Key, Lane],
+    narrow: set[Key],
 ) -> Lane:
-    """Add successors, and adjacent lanes of the same kind, to a lane."""
+    """Add successors, and adjacent lanes of the same kind, to a lane; narrow ones are passed."""
     road, section, number = key
     side = 1 if number > 0 else -1
     lanes = network.roads[road].sections[section].lanes
@@ -208,9 +217,11 @@ def _link_lane(
 
     def beside(step: int) -> str:
         other = (road, section, number + step)
+        while other in narrow:
+            other = (road, section, other[2] + step)
         if other not in made or made[other].kind != lane.kind:
             return ""
-        alike = runs_forward(network.roads[road], lanes[number + step]) == forward
+        alike = runs_forward(network.roads[road], lanes[other[2]]) == forward
         return _lane_name(other) if alike else ""
 
     # The centre lies at -side in t; left is +t for traffic along the road.

@@ -31,7 +31,8 @@ _MARKS = frozenset({
     "none", "solid", "broken", "solid solid", "solid broken", "broken solid", "broken broken",
     "curb", "edge", "grass",
 })  # fmt: skip
-"""Kinds of marks that are painted, or that nothing is painted for."""
+_BARE = frozenset({"none", "curb", "edge", "grass"})
+"""Kinds of marks that are known, and those of them that nothing is painted for."""
 _COLORS = frozenset({"standard", "white", "yellow"})
 
 
@@ -42,6 +43,8 @@ def count_unused(root: Element) -> dict[str, int]:
 
 def _unused(element: Element) -> Iterator[str]:
     if element.tag == "header":
+        # Places in the file count from its own origin, wherever that is on the globe.
+        yield from (f"{child.tag} of header" for child in element if child.tag not in _REMARKS)
         return
     yield from _unused_attributes(element)
     yield from _repeated(element)
@@ -73,6 +76,9 @@ def _unused_attributes(element: Element) -> Iterator[str]:
     elif element.tag == "junction":
         ways = element.findall("connection")
         yield from ["connection without laneLink" for way in ways if way.find("laneLink") is None]
+    if element.tag == "road" and element.get("junction", "-1") != "-1":
+        marks = (mark.get("type", "none") for mark in element.iter("roadMark"))
+        yield from ["roadMark in a junction" for kind in marks if kind in _MARKS - _BARE]
     if element.tag == "roadMark":
         kind, color = element.get("type", "none"), element.get("color", "white")
         if kind not in _MARKS:

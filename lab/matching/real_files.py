@@ -109,7 +109,10 @@ def find_files(folder: Path) -> RealFiles:
 
 
 def files_below(folder: Path) -> list[Path]:
-    """All files in a folder at any depth, sorted; links to folders are followed, each once."""
+    """All files in a folder at any depth, sorted; links to folders are followed, each once.
+
+    Folders that are missing or cannot be read have none.
+    """
     found: list[Path] = []
     folders, links, walked = [folder], list[Path](), set[str]()
     while folders or links:
@@ -117,7 +120,11 @@ def files_below(folder: Path) -> list[Path]:
         if (real := os.path.realpath(place)) in walked:
             continue
         walked.add(real)
-        for path in sorted(place.iterdir(), reverse=True):
+        try:
+            inner = sorted(place.iterdir(), reverse=True)
+        except OSError:
+            continue
+        for path in inner:
             if path.is_dir():
                 (links if path.is_symlink() else folders).append(path)
             elif path.is_file():

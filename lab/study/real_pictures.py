@@ -251,11 +251,12 @@ def _choose(root: Path, files: Sequence[Path], split: str | None) -> Sequence[Pa
     """The only file, the one of the split, or the one of the validation set; None = all files."""
     if split is None:
         return files
-    chosen = [path for path in files if split in path.stem]
-    if not split and len(files) > 1:
-        chosen = [path for path in files if "val" in path.stem]
+    # Roboflow has a folder for each split, and one name for all files.
+    names_of = {path: path.relative_to(root).as_posix() for path in files}
+    wanted = split or ("val" if len(files) > 1 else "")
+    chosen = [p for p in files if wanted in names_of[p].removeprefix("annotations/")]
     if len(chosen) != 1:
-        names = ", ".join(path.name for path in files)
+        names = ", ".join(names_of.values())
         raise ConfigError(
             f"{root}: expected one annotation file, or a split that names one; found {names}"
         )

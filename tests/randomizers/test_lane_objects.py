@@ -59,6 +59,16 @@ def test_rows_have_the_gaps_that_were_asked_for(y_m: float) -> None:
     assert np.diff(row) == pytest.approx(2.0, abs=1e-5)
 
 
+def test_lanes_that_taper_have_things_where_they_are_wide_enough() -> None:
+    """Bricks are 3 cm wide: the lane of 40 m, which widens to 12 cm, is as wide at 10 m."""
+    taper = replace(street().lanes[0], width_m=0.06, widths_m=(0.0, 0.12))
+    row = row_of(drawn(replace(street(), lanes=(taper,)), gap_m=Constant(0.44)), -1.5)
+
+    assert 10.0 <= row[0] < 10.5
+    assert row[-1] > 39.0
+    assert np.diff(row) == pytest.approx(0.5, abs=1e-5)
+
+
 def test_things_face_the_way_of_their_lane_or_its_left() -> None:
     """X of the body in the world."""
     for facing, turn in (("along", 0.0), ("left", 90.0)):

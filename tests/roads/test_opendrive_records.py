@@ -1,5 +1,6 @@
 """Records of OpenDRIVE files that change along a road, and newer elements of the standard."""
 
+import cmath
 import math
 from pathlib import Path
 
@@ -10,8 +11,9 @@ from gen_data.assets.checking import check_folder
 from gen_data.assets.library import open_library
 from gen_data.content.roads.network_surface import network_solid
 from gen_data.core.errors import AssetError
-from gen_data.core.lane_geometry import border_line
+from gen_data.core.lane_geometry import border_line, lane_borders
 from gen_data.core.scene import Lane
+from gen_data.exporters.road_map import lane_area
 from gen_data.roads.opendrive import read_opendrive
 from gen_data.roads.opendrive_lanes import network_lanes
 
@@ -135,6 +137,15 @@ def test_paint_has_the_colour_of_the_file(color: str, yellow: bool) -> None:
     assert (red > 2.0 * blue) == yellow
 
 
+def test_marks_in_a_junction_and_the_place_on_the_globe_are_named() -> None:
+    """Ways through a junction overlap: their marks are not painted."""
+    head = "<header><geoReference>+proj=utm +zone=32</geoReference></header>"
+    none = '<roadMark sOffset="50" type="none"/>'
+    way = road(right=lane(-1, WIDTH + SOLID + none)).replace('junction="-1"', 'junction="9"')
+    network = read_opendrive(text(way, more=head + '<junction id="9"/>'), "a.xodr")
+    assert network.unused == {"geoReference of header": 1, "roadMark in a junction": 1}
+
+
 def test_marks_that_are_painted_otherwise_are_named() -> None:
     marks = "".join(
         f'<roadMark sOffset="{k}" type="{kind}" color="{color}"/>'
@@ -252,11 +263,22 @@ def test_crossfall_falls_from_the_reference_line(side: str, left: bool, right: b
     assert z_m(crossfall(side), -1) == pytest.approx(fall * right, abs=1e-6)
 
 
-def test_crossfall_adds_to_superelevation() -> None:
-    """A road that rises to its left, with a roof on top."""
-    bank = '<superelevation s="0" a="0.02" b="0" c="0" d="0"/>'
-    expected = 1.75 * (math.tan(0.02) - math.tan(0.05))
-    assert z_m(bank + crossfall("both"), 1) == pytest.approx(expected, abs=1e-6)
+@pytest.mark.parametrize("roll", [0.02, -0.7])
+def test_superelevation_rolls_the_cross_section(roll: float) -> None:
+    """Lanes of 3.5 m, with a roof on top, as points of a plane that turns about the line.
+
+    A vector along the road is (t, -|t| tan 0.05) across and up, before its rotation by the roll.
+    """
+    bank = f'<superelevation s="0" a="{roll}" b="0" c="0" d="0"/>'
+    found = lanes(road(lane(1) + lane(2), lane(-1), lateral=bank + crossfall("both")))
+    for name, t in (("1.0.1", 1.75), ("1.0.2", 5.25), ("1.0.-1", -1.75)):
+        up = -abs(t) * math.tan(0.05)
+        _, y, z = found[name].center_m[0]
+        expected = (t + 1j * up) * cmath.exp(1j * roll)
+        assert (y, z) == pytest.approx((expected.real, expected.imag), abs=1e-5)
+        fall = math.copysign(math.tan(0.05), t)
+        across = 3.5 * (1 - 1j * fall) * cmath.exp(1j * roll)
+        assert found[name].width_m == pytest.approx(across.real, abs=1e-5)
 
 
 SHAPE = (
@@ -294,9 +316,9 @@ def test_the_surface_follows_the_shape_within_a_lane() -> None:
 def test_level_lanes_keep_the_height_of_their_inner_edge() -> None:
     """A sidewalk beyond a road that leans."""
     bank = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
-    assert z_m(bank, 2, 'level="true"') == pytest.approx(3.5 * math.tan(0.1), abs=1e-6)
-    assert z_m(bank, -2, 'level="true"') == pytest.approx(-3.5 * math.tan(0.1), abs=1e-6)
-    assert z_m(bank, 2, 'level="false"') == pytest.approx(5.25 * math.tan(0.1), abs=1e-6)
+    assert z_m(bank, 2, 'level="true"') == pytest.approx(3.5 * math.sin(0.1), abs=1e-6)
+    assert z_m(bank, -2, 'level="true"') == pytest.approx(-3.5 * math.sin(0.1), abs=1e-6)
+    assert z_m(bank, 2, 'level="false"') == pytest.approx(5.25 * math.sin(0.1), abs=1e-6)
 
 
 # --- lanes ---
@@ -467,7 +489,7 @@ def test_sidewalks_that_meet_head_on_lead_nowhere() -> None:
 def test_borders_follow_lanes_that_widen_shift_and_twist(rule: str) -> None:
     """Closed forms of the file: a taper beside an offset, on a superelevation that grows.
 
-    At s the offset is 0.02 s, the width 1 + 0.02 s, and the slope of the road tan(0.0005 s).
+    At s the offset is 0.02 s, the width 1 + 0.02 s, and the road is rolled by 0.0005 s.
     """
     wide = '<width sOffset="0" a="1" b="0.02" c="0" d="0"/>'
     twist = '<superelevation s="0" a="0" b="0.0005" c="0" d="0"/>'
@@ -488,8 +510,8 @@ def test_borders_follow_lanes_that_widen_shift_and_twist(rule: str) -> None:
         line = np.array(border_line(one, "left" if is_upper == runs_east else "right"))
         s = line[:, 0] + 50.0
         t = slope * s + middle_m
-        assert line[:, 1] == pytest.approx(t, abs=2e-3)
-        assert line[:, 2] == pytest.approx(t * np.tan(0.0005 * s), abs=2e-3)
+        assert line[:, 1] == pytest.approx(t * np.cos(0.0005 * s), abs=2e-3)
+        assert line[:, 2] == pytest.approx(t * np.sin(0.0005 * s), abs=2e-3)
 
 
 def test_borders_and_surface_bend_where_a_record_begins() -> None:
@@ -504,3 +526,48 @@ def test_borders_and_surface_bend_where_a_record_begins() -> None:
     asphalt = network_solid(read_opendrive(text(made), "a.xodr")).mesh.vertices_m[:, :2]
     corners = np.round(asphalt.astype(float), 4).tolist()
     assert {(-16.9, -3.0), (3.1, -5.0)} <= set(map(tuple, corners))
+
+
+def tapered(*widths: tuple[float, float, float]) -> str:
+    return "".join(f'<width sOffset="{s}" a="{a}" b="{b}" c="0" d="0"/>' for s, a, b in widths)
+
+
+def border_spans(found: dict[str, Lane]) -> set[tuple[str, str, int, int]]:
+    """Borders: name, kind, and where they begin and end along the road, in whole metres."""
+    spans: set[tuple[str, str, int, int]] = set()
+    for border in lane_borders(tuple(found.values())):
+        low, high = sorted(round(border.points_m[k][0] + 50.0) for k in (0, -1))
+        spans.add((border.name, border.kind, low, high))
+    return spans
+
+
+def test_a_lane_without_width_has_one_border() -> None:
+    """A lane of no width up to 40 m, which is 3 m wide from 70 m on, outside and inside another.
+
+    At stations of 2 m it is 0.2 m wide at 42 m and 0.4 m at 44 m.
+    """
+    opens = tapered((0, 0, 0), (40, 0, 0.1), (70, 3, 0))
+    outside = lanes(road(right=lane(-1) + lane(-2, opens)))
+    assert border_spans(outside) == {
+        ("1.0.-1:left", "edge", 0, 100),
+        ("1.0.-2:left", "lane", 42, 100),
+        ("1.0.-2:right", "edge", 0, 100),
+    }
+    inside = lanes(road(right=lane(-1, opens) + lane(-2)))
+    assert border_spans(inside) == {
+        ("1.0.-1:left", "edge", 0, 100),
+        ("1.0.-2:left", "lane", 42, 100),
+        ("1.0.-2:right", "edge", 0, 100),
+    }
+    outline = lane_area([outside["1.0.-2"]]).exterior
+    assert len(np.unique(outline.round(6), axis=0)) == len(outline) - 1  # closed at its tip
+    following = np.roll(outline, -1, axis=0)
+    twice_m2 = (outline[:, 0] * following[:, 1] - outline[:, 1] * following[:, 0]).sum()
+    assert abs(twice_m2) / 2 == pytest.approx(30 * 3 / 2 + 30 * 3, abs=0.1)
+
+
+def test_a_lane_that_has_no_width_anywhere_is_none() -> None:
+    """The lanes on both sides of it are neighbours."""
+    found = lanes(road(right=lane(-1) + lane(-2, tapered((0, 0, 0))) + lane(-3)))
+    assert {"1.0.-1", "1.0.-3"} == {name for name in found if found[name].kind == "driving"}
+    assert (found["1.0.-1"].right, found["1.0.-3"].left) == ("1.0.-3", "1.0.-1")

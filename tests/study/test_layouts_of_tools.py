@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from gen_data.core.errors import StorageError
+from gen_data.core.errors import ConfigError, StorageError
 from gen_data.lab.matching.label_files import RealObject
 from gen_data.lab.matching.real_files import find_files
 from gen_data.lab.study.real_pictures import read_real
@@ -56,6 +56,16 @@ def test_cocos_splits_keep_apart_images_of_one_name(label: str, image: str, tmp_
     assert found(tmp_path) == {
         image.format(s): k for k, s in enumerate(("test", "train", "val"), 1)
     }
+
+
+def test_a_split_may_be_a_folder(tmp_path: Path) -> None:
+    """The validation set judges, if no split is given."""
+    for split in ("train", "valid"):
+        coco(tmp_path / split / "_annotations.coco.json", {"bbox": [1, 1, 5, 5]})
+        write_picture(tmp_path / split / "1.png")
+    for asked, split in (("", "valid"), ("train", "train")):
+        (picture,) = read_real(tmp_path, asked).pictures
+        assert picture.path == tmp_path / split / "1.png"
 
 
 def test_an_image_name_of_several_files_is_counted_and_not_guessed(tmp_path: Path) -> None:
@@ -162,6 +172,11 @@ def test_images_of_linked_folders_are_read_once(tmp_path: Path) -> None:
     (real / "again").symlink_to(real, target_is_directory=True)
     assert found(real) == {"images/1.png": 1}
     assert find_files(real).photos == (real / "images/1.png",)
+
+
+def test_a_missing_folder_has_no_labels(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"there are no labels; expected"):
+        read_real(tmp_path / "gone")
 
 
 VOC = (
