@@ -155,6 +155,23 @@ def test_yolos_splits_are_the_pictures(text: str, tmp_path: Path) -> None:
     assert not real.skipped
 
 
+def test_a_split_is_one_of_yolos_and_refused_where_there_are_none(tmp_path: Path) -> None:
+    """It was ignored: pictures for training judged, too."""
+    for folder in ("yolo", "kitti", "voc"):
+        write_picture(tmp_path / folder / "image_2/1.png")
+    write(tmp_path / "yolo/data.yaml", "train: images/train\nval: images/val\nnames: [cup]\n")
+    for split in ("train", "val"):
+        write(tmp_path / f"yolo/labels/{split}/1.txt", BOX)
+        write_picture(tmp_path / f"yolo/images/{split}/1.png")
+    (picture,) = read_real(tmp_path / "yolo", "val").pictures
+    assert picture.path == tmp_path / "yolo/images/val/1.png"
+    write(tmp_path / "kitti/label_2/1.txt", "Car 0 0 0 1 2 3 4\n")
+    write(tmp_path / "voc/image_2/1.xml", VOC.format("1.png"))
+    for folder, split in (("kitti", "val"), ("voc", "val"), ("yolo", "test")):
+        with pytest.raises(ConfigError, match=rf"no split '{split}'; expected COCO's files"):
+            read_real(tmp_path / folder, split)
+
+
 def test_yolos_labels_of_a_split_without_their_images_are_counted(tmp_path: Path) -> None:
     write(tmp_path / "data.yaml", "train: images/train\nnames: [cup]\n")
     write(tmp_path / "labels/train/1.txt", BOX)
