@@ -48,7 +48,7 @@ def found(folder: Path) -> dict[str, int]:
     ],
 )
 def test_cocos_splits_keep_apart_images_of_one_name(label: str, image: str, tmp_path: Path) -> None:
-    """The boxes of each split are those of its own image, whichever comes first."""
+    """The boxes of each split belong to its own image, whichever comes first."""
     for boxes, split in enumerate(("test", "train", "val"), 1):
         box = {"bbox": [1, 1, 5, 5]}
         coco(tmp_path / label.format(split), *[box] * boxes)
@@ -79,7 +79,7 @@ def test_an_image_name_of_several_files_is_counted_and_not_guessed(tmp_path: Pat
 
 
 def test_an_image_in_several_cocos_files_counts_once_with_all_its_objects(tmp_path: Path) -> None:
-    """A file of all splits beside theirs, and a file for each class."""
+    """A file of all splits, one of a split, and one of another class."""
     write_picture(tmp_path / "images/1.png")
     same, other = {"bbox": [1, 1, 5, 5]}, {"bbox": [9, 9, 5, 5]}
     coco(tmp_path / "annotations/all.json", same, other)
