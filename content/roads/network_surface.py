@@ -89,7 +89,7 @@ def _marks(road: Road, section: Section, slots: dict[str, int]) -> Iterator[Patc
     for number, lane in section.lanes.items():
         for start, end, mark in section.mark_spans(lane):
             for k, word in enumerate(() if road.junction else mark.lines):
-                # Lines are listed from the inside out, those of the centre from the left.
+                # Lines are listed from the inside out, in the centre from the left.
                 first_m = mark.width_m * (len(mark.lines) - 1) * (-1 if number > 0 else 1)
                 aside_m = first_m if k == 0 else -first_m
                 whole = (road.stations(start, end, _STEP_M),)

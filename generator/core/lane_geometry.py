@@ -138,7 +138,7 @@ def _find_borders(lanes: tuple[Lane, ...]) -> tuple[LaneBorder, ...]:
 def _parts_between(
     left: Lane | None, right: Lane, line: tuple[Vec3, ...]
 ) -> list[tuple[Vec3, ...]]:
-    """Parts of the line between two lanes where it is no other border of a lane without width.
+    """Parts of the line between two lanes, without doubles at a lane that has no width there.
 
     Such a lane's outer border is the edge of the next one; between two others it has none.
     """

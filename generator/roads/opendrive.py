@@ -137,7 +137,7 @@ class Mark:
 
     Attributes:
         kind: ``solid``, ``broken solid``, ``none``, ... as in the file.
-        width_m: Of each line.
+        width_m: Width of each line.
     """
 
     kind: str

@@ -34,7 +34,7 @@ _STEP_M = 2.0
 _TWIST, _WIDENING_M = 1e-3, 1e-3
 """Cross slopes, and widths, of a lane that change by less than this are one."""
 _NARROW_M = 0.05
-"""Width from which on a lane has a cross slope of its own: heights are rounded."""
+"""Least width by which differences in height are divided for cross slopes."""
 _SIGN_KINDS = frozenset({"sidewalk", "parking"})
 """Kinds that always run with the street on their left, whichever side traffic keeps to."""
 

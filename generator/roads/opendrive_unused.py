@@ -32,7 +32,7 @@ _MARKS = frozenset({
     "curb", "edge", "grass",
 })  # fmt: skip
 _BARE = frozenset({"none", "curb", "edge", "grass"})
-"""Kinds of marks that are known, and those of them that nothing is painted for."""
+"""Known kinds of marks, and the ones without paint."""
 _COLORS = frozenset({"standard", "white", "yellow"})
 
 

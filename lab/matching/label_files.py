@@ -171,10 +171,11 @@ def read_yolo_classes(path: Path) -> tuple[list[str], bool]:
         raise StorageError(f"{path}: no list of classes in YOLO's format: {error!r}") from error
 
 
-def yolo_images(path: Path) -> list[Path]:
+def yolo_images(path: Path, split: str = "") -> list[Path]:
     """Folders, lists and images that ``data.yaml`` names as its splits, where they exist.
 
-    Names refer to its ``path``, or to its own folder where there is no such path.
+    ``split`` is a part of the name of the wanted ones, empty = all. Names refer to its ``path``,
+    or to its own folder where there is no such path.
     """
     if path.suffix not in (".yaml", ".yml"):
         return []
@@ -182,8 +183,8 @@ def yolo_images(path: Path) -> list[Path]:
     base = path.parent / str(content.get("path") or "")
     base = base if base.is_dir() else path.parent
     found = []
-    for split in ("train", "val", "test"):
-        stated = content.get(split) or []
+    for key in ("train", "val", "test"):
+        stated = (content.get(key) or []) if split in key else []
         for name in [stated] if isinstance(stated, str) else stated:
             # Roboflow writes ../train/images for train/images.
             places = (base / str(name), base / str(name).removeprefix("../"))

@@ -140,7 +140,8 @@ def read_real(
 
     Args:
         folder: The folder; also one that contains the folders of an export.
-        split: Part of the name of COCO's file, where there are several; None = read all of them.
+        split: Part of the name of COCO's file, where there are several, or of a split of YOLO's
+            data.yaml, empty = all of these; None = read all of both.
         layout: The only layout to look for; empty = any.
         most: Largest number of pictures, chosen evenly; None = all.
 
@@ -198,30 +199,44 @@ def _find_coco(folder: Path, split: str | None, most: int | None) -> Found:
     return None
 
 
-def _find_kitti(folder: Path, _: str | None, most: int | None) -> Found:
+def _find_kitti(folder: Path, split: str | None, most: int | None) -> Found:
     for root in (folder, folder / "training", folder / "kitti/training"):
         if (root / "label_2").is_dir():
+            _refuse_split(root, split)
             return partial(_read_kitti, root, most)
     return None
 
 
-def _find_yolo(folder: Path, _: str | None, most: int | None) -> Found:
+def _find_yolo(folder: Path, split: str | None, most: int | None) -> Found:
     for root in (folder, folder / "detect", folder / "yolo/detect"):
         files = [*sorted(root.glob("*.yaml")), *sorted(root.glob("*.yml"))]
         files = [path for path in files if b"names:" in path.read_bytes()]
         files += [root / name for name in ("classes.txt", "labels/classes.txt", "obj.names")]
         classes = next(filter(Path.is_file, files), None)
         if classes is not None:
-            return partial(_read_yolo, root, classes, most)
+            return partial(_read_yolo, root, classes, split or "", most)
     return None
 
 
-def _find_voc(folder: Path, _: str | None, most: int | None) -> Found:
+def _find_voc(folder: Path, split: str | None, most: int | None) -> Found:
     for at in ("Annotations", "VOC*/*/Annotations", "voc/VOC*/*/Annotations"):
         if files := sorted(folder.glob(f"{at}/**/*.xml")):
-            return partial(_read_voc, files, most)
-    files = [p for p in files_below(folder) if p.suffix == ".xml" and _is_voc(p)]
-    return partial(_read_voc, files, most) if files else None
+            break
+    else:
+        files = [p for p in files_below(folder) if p.suffix == ".xml" and _is_voc(p)]
+    if not files:
+        return None
+    _refuse_split(folder, split)
+    return partial(_read_voc, files, most)
+
+
+def _refuse_split(place: Path, split: str | None) -> None:
+    """Refuse a split of labels that have none."""
+    if split:
+        raise ConfigError(
+            f"{place}: its labels have no split '{split[:40]}'; expected COCO's files, YOLO's "
+            "data.yaml with splits, or no split"
+        )
 
 
 LAYOUTS: Mapping[str, Callable[[Path, str | None, int | None], Found]] = {
@@ -369,10 +384,12 @@ def _read_kitti(root: Path, most: int | None) -> RealSet:
     return _numbered(root / "label_2", frames, most, skipped)
 
 
-def _read_yolo(root: Path, classes: Path, most: int | None) -> RealSet:
+def _read_yolo(root: Path, classes: Path, split: str, most: int | None) -> RealSet:
     names, has_keypoints = label_files.read_yolo_classes(classes)
     below = files_below(root)
-    places = label_files.yolo_images(classes)
+    places = label_files.yolo_images(classes, split)
+    if not places:
+        _refuse_split(classes, split)
     if places:
         images = {_yolo_labels(path): path for path in _listed_images(places)}
         folders = {_yolo_labels(place / "image.png").parent for place in places if place.is_dir()}

@@ -40,7 +40,11 @@ gen-data study photos --results old=a.json --results new=b.json
     metavar="NAME=FILE",
     help="Instead of training: COCO results of a detector of yours.",
 )
-@click.option("--split", default="", help="Part of the name of COCO's annotation file.")
+@click.option(
+    "--split",
+    default="",
+    help="Part of the name of COCO's annotation file, or of a split of YOLO's data.yaml.",
+)
 @click.option("--n", "-n", type=int, default=400, show_default=True, help="Samples per data set.")
 @click.option("--seeds", type=int, default=3, show_default=True, help="Repetitions.")
 @click.option("--steps", type=int, default=800, show_default=True, help="Training steps.")

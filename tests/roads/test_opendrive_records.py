@@ -487,7 +487,7 @@ def test_sidewalks_that_meet_head_on_lead_nowhere() -> None:
 
 @pytest.mark.parametrize("rule", ["RHT", "LHT"])
 def test_borders_follow_lanes_that_widen_shift_and_twist(rule: str) -> None:
-    """Closed forms of the file: a taper beside an offset, on a superelevation that grows.
+    """Closed forms of the file: a taper next to an offset, on a superelevation that grows.
 
     At s the offset is 0.02 s, the width 1 + 0.02 s, and the road is rolled by 0.0005 s.
     """
@@ -566,7 +566,7 @@ def test_a_lane_without_width_has_one_border() -> None:
     assert abs(twice_m2) / 2 == pytest.approx(30 * 3 / 2 + 30 * 3, abs=0.1)
 
 
-def test_a_lane_that_has_no_width_anywhere_is_none() -> None:
+def test_lanes_without_width_anywhere_are_left_out() -> None:
     """The lanes on both sides of it are neighbours."""
     found = lanes(road(right=lane(-1) + lane(-2, tapered((0, 0, 0))) + lane(-3)))
     assert {"1.0.-1", "1.0.-3"} == {name for name in found if found[name].kind == "driving"}

@@ -48,7 +48,7 @@ def found(folder: Path) -> dict[str, int]:
     ],
 )
 def test_cocos_splits_keep_apart_images_of_one_name(label: str, image: str, tmp_path: Path) -> None:
-    """The boxes of each split are those of its own image, whichever comes first."""
+    """The boxes of each split belong to its own image, whichever comes first."""
     for boxes, split in enumerate(("test", "train", "val"), 1):
         box = {"bbox": [1, 1, 5, 5]}
         coco(tmp_path / label.format(split), *[box] * boxes)
@@ -79,7 +79,7 @@ def test_an_image_name_of_several_files_is_counted_and_not_guessed(tmp_path: Pat
 
 
 def test_an_image_in_several_cocos_files_counts_once_with_all_its_objects(tmp_path: Path) -> None:
-    """A file of all splits beside theirs, and a file for each class."""
+    """A file of all splits, one of a split, and one of another class."""
     write_picture(tmp_path / "images/1.png")
     same, other = {"bbox": [1, 1, 5, 5]}, {"bbox": [9, 9, 5, 5]}
     coco(tmp_path / "annotations/all.json", same, other)
@@ -153,6 +153,23 @@ def test_yolos_splits_are_the_pictures(text: str, tmp_path: Path) -> None:
     assert found(tmp_path) == {"images/a/1.png": 1, "images/b/2.png": 0}
     assert real.pictures[0].objects == (RealObject("cup", (24, 12, 40, 36)),)
     assert not real.skipped
+
+
+def test_a_split_is_one_of_yolos_and_refused_where_there_are_none(tmp_path: Path) -> None:
+    """It was ignored: pictures for training judged, too."""
+    for folder in ("yolo", "kitti", "voc"):
+        write_picture(tmp_path / folder / "image_2/1.png")
+    write(tmp_path / "yolo/data.yaml", "train: images/train\nval: images/val\nnames: [cup]\n")
+    for split in ("train", "val"):
+        write(tmp_path / f"yolo/labels/{split}/1.txt", BOX)
+        write_picture(tmp_path / f"yolo/images/{split}/1.png")
+    (picture,) = read_real(tmp_path / "yolo", "val").pictures
+    assert picture.path == tmp_path / "yolo/images/val/1.png"
+    write(tmp_path / "kitti/label_2/1.txt", "Car 0 0 0 1 2 3 4\n")
+    write(tmp_path / "voc/image_2/1.xml", VOC.format("1.png"))
+    for folder, split in (("kitti", "val"), ("voc", "val"), ("yolo", "test")):
+        with pytest.raises(ConfigError, match=rf"no split '{split}'; expected COCO's files"):
+            read_real(tmp_path / folder, split)
 
 
 def test_yolos_labels_of_a_split_without_their_images_are_counted(tmp_path: Path) -> None:
