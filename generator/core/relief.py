@@ -95,8 +95,8 @@ class RoadProfile:
         """Its heights on a grid [m, n], and their weights, which fall with the distance from it.
 
         Args:
-            x_m: Of the rows, [m, 1].
-            y_m: Of the columns, [1, n].
+            x_m: Places of the rows, [m, 1].
+            y_m: Places of the columns, [1, n].
         """
         s, t = self._along_and_left(x_m, y_m)
         beyond = s - np.clip(s, 0.0, self.length_m)
@@ -283,7 +283,7 @@ def _bend(past_m: Array, length_m: float) -> Array:
 
 
 _Places = tuple[tuple[Ints, Ints, Ints, Ints], Array, Array]
-"""Cells of places, and where in them they are, as ``_Grid.find`` returns them."""
+"""Corners of cells, and shares along x and y, by ``_Grid.find``."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
