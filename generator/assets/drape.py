@@ -116,9 +116,9 @@ class _Ground:
         raised[:, 2] += self.height(points_m) / self.scale
         return raised
 
-    def turned(self, points_m: Array, normals: Array) -> Array:
-        """Normals [n, 3] of the surface after it was raised."""
-        slope_x, slope_y = self.relief.gradient(self.plan(points_m)).T
+    def turned(self, slopes: Array, normals: Array) -> Array:
+        """Normals [n, 3] of a surface that was raised, given the slopes [2, n] of the ground."""
+        slope_x, slope_y = slopes
         along_x, along_y = _turned_about_z(self.T_world_body.inverse(), slope_x, slope_y)
         x, y, z = normals.T
         x, y = x - along_x * z, y - along_y * z
@@ -154,12 +154,13 @@ def _draped_mesh(mesh: MeshData, ground: _Ground, divide: _Cut) -> MeshData:
     columns = (mesh.vertices_m, mesh.normals, mesh.uvs)
     corners = np.concatenate([np.asarray(column, np.float64) for column in columns], axis=1)
     corners, faces, slots = divide(corners, mesh.faces.astype(np.int64), mesh.face_slots, ground)
-    level = corners[:, :3]
+    heights, slopes = ground.relief.surface(ground.plan(corners))
+    corners[:, 2] += heights / ground.scale
     return replace(
         mesh,
-        vertices_m=ground.raised(level).astype(np.float32),
+        vertices_m=corners[:, :3].astype(np.float32),
         faces=faces.astype(np.int32),
-        normals=ground.turned(level, corners[:, 3:6]).astype(np.float32),
+        normals=ground.turned(slopes, corners[:, 3:6]).astype(np.float32),
         uvs=corners[:, 6:].astype(np.float32),
         face_slots=slots.astype(np.int32),
     )
@@ -217,10 +218,11 @@ def _cut_on_grid(
     corners: Array, faces: Ints, slots: Ints, ground: _Ground
 ) -> tuple[Array, Ints, Ints]:
     """Cut along the lines of the grid and the diagonals of its cells."""
+    x, y = np.zeros((2, 0))
     for along_x, along_y in ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0)):
-        x, y = (ground.plan(corners) / CELL_M).T
-        at = along_x * x + along_y * y
-        corners, faces, slots = _cut(corners, at, faces, slots)
+        new_x, new_y = (ground.plan(corners[len(x) :]) / CELL_M).T
+        x, y = np.concatenate([x, new_x]), np.concatenate([y, new_y])
+        corners, faces, slots = _cut(corners, along_x * x + along_y * y, faces, slots)
     return corners, faces, slots
 
 
@@ -252,8 +254,9 @@ def _cut(corners: Array, at: Array, faces: Ints, slots: Ints) -> tuple[Array, In
         a, b, c, slots = (of.take(crossing) for of in (a, b, c, slots))
         a, b, c = _alone_first((a, b, c), [height - line for height in _taken(at, a, b, c)])
         one, ab = _meetings(at, a, b, line, len(at))
-        other, ac = _meetings(at, a, c, line, len(at) + len(one))
-        corners, at = _with_meetings(corners, at, np.concatenate([one, other]))
+        other, ac = _meetings(at, a, c, line, len(at) + len(one[0]))
+        low, high, met = (np.concatenate(column) for column in zip(one, other, strict=True))
+        corners, at = _with_meetings(corners, at, low, high, met)
         # A corner on the line leaves a part without area.
         parts = ((a, ab, ac), (ab, b, c), (ab, c, ac))
         whole = [np.flatnonzero((i != j) & (j != k) & (k != i)) for i, j, k in parts]
@@ -294,8 +297,10 @@ def _alone_first(corners: Sequence[Ints], heights: Sequence[Array]) -> tuple[Int
     return pick(a, b, c), pick(b, c, a), pick(c, a, b)
 
 
-def _meetings(at: Array, a: Ints, b: Ints, line: Array, count: int) -> tuple[Array, Ints]:
-    """Corners where edges meet lines, as rows of two ends and a line; the number of each edge's.
+def _meetings(
+    at: Array, a: Ints, b: Ints, line: Array, count: int
+) -> tuple[tuple[Ints, Ints, Array], Ints]:
+    """Corners where edges meet lines, as columns of two ends and a line; the number of each edge's.
 
     Edges that two triangles share get one corner; new ones are numbered from ``count`` on.
     """
@@ -303,12 +308,13 @@ def _meetings(at: Array, a: Ints, b: Ints, line: Array, count: int) -> tuple[Arr
     key = (low * len(at) + high) * 2**20 + (line.astype(np.int64) + 2**19)
     _, first, which = np.unique(key, return_index=True, return_inverse=True)
     number = np.where(at.take(b) == line, b, count + which.ravel())
-    return np.stack([low.take(first), high.take(first), line.take(first)], axis=1), number
+    return (low.take(first), high.take(first), line.take(first)), number
 
 
-def _with_meetings(corners: Array, at: Array, meetings: Array) -> tuple[Array, Array]:
+def _with_meetings(
+    corners: Array, at: Array, low: Ints, high: Ints, line: Array
+) -> tuple[Array, Array]:
     """Corners, and the function at them, with those added where edges meet lines."""
-    (low, high), line = meetings[:, :2].T.astype(np.int64), meetings[:, 2]
     start, made = corners.take(low, axis=0), corners.take(high, axis=0)
     made -= start
     made *= ((line - at.take(low)) / (at.take(high) - at.take(low)))[:, None]

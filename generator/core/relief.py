@@ -89,10 +89,15 @@ class RoadProfile:
 
     def line(self) -> Array:
         """Points [n, 2] of its reference line, a few metres apart."""
-        return self._stations()[:, 1:3]
+        return _stations(self)[:, 1:3]
 
     def weigh(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Its heights at places [m, n], and their weights, which fall with the distance from it."""
+        """Its heights on a grid [m, n], and their weights, which fall with the distance from it.
+
+        Args:
+            x_m: Places of the rows, [m, 1].
+            y_m: Places of the columns, [1, n].
+        """
         s, t = self._along_and_left(x_m, y_m)
         beyond = s - np.clip(s, 0.0, self.length_m)
         aside = np.maximum(np.abs(t) - self.half_width_m, 0.0)
@@ -104,7 +109,9 @@ class RoadProfile:
             far = np.abs(t) > first
             share = np.clip((np.abs(t[far]) - first) / (last - first), 0.0, 1.0)
             share = share * share * (3.0 - 2.0 * share)
-            height[far] = (1.0 - share) * height[far] + share * self._far(x_m[far], y_m[far])
+            row, column = np.nonzero(far)
+            away = self._far(x_m[row, 0], y_m[0, column])
+            height[far] = (1.0 - share) * height[far] + share * away
         return height, weight
 
     def _land(self, t_m: Array) -> Array:
@@ -134,29 +141,13 @@ class RoadProfile:
         first = max(_INSIDE[0] / sharpest, self.half_width_m)
         return first, max(_INSIDE[1] / sharpest, first + CELL_M)
 
-    def _heading(self, s_m: Array) -> Array:
+    def heading(self, s_m: Array) -> Array:
+        """Headings [n] of its reference line at arc lengths [n]."""
         heading: Array = self.yaw_rad + self.curvature_per_m * s_m
         for start, spiral, arc, curvature, _ in self._turns():
             ramp = _bend(s_m - start, spiral) - _bend(s_m - start - spiral - arc, spiral)
             heading = heading + curvature * ramp
         return heading
-
-    def _stations(self) -> Array:
-        """Arc lengths, points, headings and curvatures [n, 5] of its reference line."""
-        s = np.linspace(0.0, self.length_m, 2 + int(self.length_m / CELL_M))
-        if not self.bends:
-            turn = self.curvature_per_m * s
-            chord = s * np.sinc(turn / (2.0 * np.pi))
-            heading = self.yaw_rad + 0.5 * turn
-            x, y = self.x_m + chord * np.cos(heading), self.y_m + chord * np.sin(heading)
-        else:
-            x, y = (
-                start + np.concatenate([[0.0], np.cumsum(_simpson(of, self._heading, s))])
-                for start, of in ((self.x_m, np.cos), (self.y_m, np.sin))
-            )
-        step = 0.5
-        bent = (self._heading(s + step) - self._heading(s - step)) / (2.0 * step)
-        return np.column_stack([s, x, y, self._heading(s), bent])
 
     def _along_and_left(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
         """Arc lengths and distances to the left of the nearest points of the line."""
@@ -172,14 +163,14 @@ class RoadProfile:
         return along, side * (radius - np.hypot(u, radius - side * v))
 
     def _near_bends(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        stations = self._stations()
-        best, nearest = np.full(x_m.shape, np.inf), np.zeros(x_m.shape, np.int64)
+        stations = _stations(self)
+        shape = np.broadcast_shapes(x_m.shape, y_m.shape)
+        best, nearest = np.full(shape, np.inf), np.zeros(shape, np.int64)
         for number, (_, x, y, _, _) in enumerate(stations):
-            dx, dy = x_m - x, y_m - y
-            square = dx * dx + dy * dy
-            nearest[square < best] = number
+            square = np.square(x_m - x) + np.square(y_m - y)
+            np.copyto(nearest, number, where=square < best)
             np.minimum(square, best, out=best)
-        at, x, y, heading, bent = np.moveaxis(stations[nearest], -1, 0)
+        at, x, y, heading, bent = (column.take(nearest) for column in stations.T)
         c, s = np.cos(heading), np.sin(heading)
         u, v = c * (x_m - x) + s * (y_m - y), c * (y_m - y) - s * (x_m - x)
         # The line near a station is its arc of curvature.
@@ -189,7 +180,7 @@ class RoadProfile:
 
     def _far(self, x_m: Array, y_m: Array) -> Array:
         """Smooth heights [n] of land far from the line, by Shepard's weights."""
-        stations = self._stations()
+        stations = _stations(self)
         total, heights = np.zeros(x_m.shape), np.zeros(x_m.shape)
         z = self.height(stations[:, 0])
         for number, (_, x, y, heading, _) in enumerate(stations):
@@ -220,27 +211,13 @@ class Relief:
     def height(self, points_m: Array) -> Array:
         """Heights [n] of the ground at places [n, 2 or more], x and y first."""
         grid = _sampled(self)
-        corners, u, v = grid.find(points_m)
-        here, north_z, east_z, cross_z = (grid.heights_m.take(corner) for corner in corners)
-        east, north, cross = east_z - here, north_z - here, cross_z - here
-        # The diagonal of a cell runs from its corner of least x and y to its opposite corner.
-        lower: Array = u * east + v * (cross - east)
-        upper: Array = v * north + u * (cross - north)
-        heights: Array = here + np.where(u >= v, lower, upper)
-        return heights
+        return grid.on_planes(grid.find(points_m))
 
-    def gradient(self, points_m: Array) -> Array:
-        """Slopes [n, 2] along x and y of the smooth ground, for shading."""
+    def surface(self, points_m: Array) -> tuple[Array, Array]:
+        """Heights as by ``height``, and slopes [2, n] along x and y of the smooth ground."""
         grid = _sampled(self)
-        corners, u, v = grid.find(points_m)
-
-        def blended(slope: Array) -> Array:
-            here, north, east, cross = (slope.take(corner) for corner in corners)
-            near, far = (1.0 - u) * here + u * east, (1.0 - u) * north + u * cross
-            mixed: Array = (1.0 - v) * near + v * far
-            return mixed
-
-        return np.stack([blended(slope) for slope in grid.slopes], axis=1)
+        places = grid.find(points_m)
+        return grid.on_planes(places), grid.smooth_slopes(places)
 
     def numbers(self) -> tuple[float, ...]:
         """All values in a row, for ids of assets; before its bends each road has their number."""
@@ -269,6 +246,25 @@ class Relief:
         return cls(tuple(roads))
 
 
+@lru_cache(maxsize=16)
+def _stations(road: RoadProfile) -> Array:
+    """Arc lengths, points, headings and curvatures [n, 5] of the reference line of a road."""
+    s = np.linspace(0.0, road.length_m, 2 + int(road.length_m / CELL_M))
+    if not road.bends:
+        turn = road.curvature_per_m * s
+        chord = s * np.sinc(turn / (2.0 * np.pi))
+        heading = road.yaw_rad + 0.5 * turn
+        x, y = road.x_m + chord * np.cos(heading), road.y_m + chord * np.sin(heading)
+    else:
+        x, y = (
+            start + np.concatenate([[0.0], np.cumsum(_simpson(of, road.heading, s))])
+            for start, of in ((road.x_m, np.cos), (road.y_m, np.sin))
+        )
+    step = 0.5
+    bent = (road.heading(s + step) - road.heading(s - step)) / (2.0 * step)
+    return np.column_stack([s, x, y, road.heading(s), bent])
+
+
 def _simpson(of: Callable[[Array], Array], angle: Callable[[Array], Array], s_m: Array) -> Array:
     """Integrals [n - 1] of a function of an angle between arc lengths [n]."""
     a, b = s_m[:-1], s_m[1:]
@@ -280,9 +276,14 @@ def _simpson(of: Callable[[Array], Array], angle: Callable[[Array], Array], s_m:
 
 def _bend(past_m: Array, length_m: float) -> Array:
     """Rise of a line whose slope turns from 0 to 1 over a length, at distances from its start."""
-    within = np.clip(past_m, 0.0, length_m)
-    rise: Array = within * within / (2.0 * length_m) + np.maximum(past_m - length_m, 0.0)
+    past = np.maximum(past_m, 0.0)
+    within = np.minimum(past, length_m)
+    rise: Array = within * within / (2.0 * length_m) + (past - within)
     return rise
+
+
+_Places = tuple[tuple[Ints, Ints, Ints, Ints], Array, Array]
+"""Corners of cells, and shares along x and y, by ``_Grid.find``."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -299,7 +300,7 @@ class _Grid:
     heights_m: Array
     slopes: Array
 
-    def find(self, points_m: Array) -> tuple[tuple[Ints, Ints, Ints, Ints], Array, Array]:
+    def find(self, points_m: Array) -> _Places:
         """Cells of places [n, 2 or more], and where in them they are; outside, at the rim.
 
         Returns:
@@ -319,6 +320,27 @@ class _Grid:
         here = cells[0] * width + cells[1]
         return (here, here + 1, here + width, here + width + 1), shares[0], shares[1]
 
+    def on_planes(self, places: _Places) -> Array:
+        """Heights [n] of the triangles of cells."""
+        corners, u, v = places
+        here, north_z, east_z, cross_z = (self.heights_m.take(corner) for corner in corners)
+        east, north, cross = east_z - here, north_z - here, cross_z - here
+        # The diagonal of a cell runs from its corner of least x and y to its opposite corner.
+        lower: Array = u * east + v * (cross - east)
+        upper: Array = v * north + u * (cross - north)
+        heights: Array = here + np.where(u >= v, lower, upper)
+        return heights
+
+    def smooth_slopes(self, places: _Places) -> Array:
+        """Slopes [2, n] along x and y, for shading."""
+        corners, u, v = places
+        mixed = []
+        for slope in self.slopes:
+            here, north, east, cross = (slope.take(corner) for corner in corners)
+            near, far = (1.0 - u) * here + u * east, (1.0 - u) * north + u * cross
+            mixed.append((1.0 - v) * near + v * far)
+        return np.stack(mixed)
+
 
 @lru_cache(maxsize=4)
 def _sampled(relief: Relief) -> _Grid:
@@ -327,8 +349,7 @@ def _sampled(relief: Relief) -> _Grid:
     first = np.floor((lines.min(axis=0) - _REACH_M) / CELL_M)
     last = np.ceil((lines.max(axis=0) + _REACH_M) / CELL_M)
     x, y = (CELL_M * np.arange(a, b + 1.0) for a, b in zip(first, last, strict=True))
-    places = np.meshgrid(x, y, indexing="ij")
-    weighed = [road.weigh(*places) for road in relief.roads]
+    weighed = [road.weigh(x[:, None], y[None]) for road in relief.roads]
     total = sum(weight for _, weight in weighed)
     # Rounded as poses are: the same bits on every processor.
     heights = np.round(sum(height * weight for height, weight in weighed) / total, 6)

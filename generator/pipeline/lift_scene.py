@@ -31,7 +31,7 @@ from gen_data.core import asset_types, decimals, lane_geometry, motion, scene_ti
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.relief import CELL_M, Relief
 from gen_data.core.scene import Body, Camera, Lane, Light, Scene
-from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.core.se3 import SE3, Array, Vec3, unit_quaternions_to_rotations
 from gen_data.pipeline import house_entrances
 from gen_data.pipeline.house_entrances import Ways
 from gen_data.traffic.axles import find_axles
@@ -112,10 +112,19 @@ class _Foot:
     x_m: tuple[float, float]
     y_m: tuple[float, float]
 
-    def corners(self, poses: Sequence[SE3]) -> Array:
-        """Rear right, rear left, front right, front left of a body at poses, [n, 4, 3]."""
-        own = np.array([[x, y, 0.0] for x in self.x_m for y in self.y_m])
-        return np.array([pose.apply(own) for pose in poses])
+
+def _corners(feet: Sequence[_Foot], poses: Sequence[SE3]) -> Array:
+    """Rear right, rear left, front right, front left of feet [n] at their poses [n], [n, 4, 3].
+
+    All at once: a street has hundreds of bodies.
+    """
+    sides = np.array([(foot.x_m, foot.y_m) for foot in feet]).reshape(-1, 2, 2)
+    x, y = sides[:, 0].repeat(2, axis=1)[..., None], np.tile(sides[:, 1], 2)[..., None]
+    quaternions = np.array([pose.quaternion_wxyz for pose in poses]).reshape(-1, 4)
+    turns = unit_quaternions_to_rotations(quaternions)
+    origins_m = np.array([pose.translation_m for pose in poses]).reshape(-1, 1, 3)
+    corners: Array = turns[:, None, :, 0] * x + turns[:, None, :, 1] * y + origins_m
+    return corners
 
 
 def _foot(body: Body, assets: AssetLibrary) -> _Foot:
@@ -178,10 +187,7 @@ def _lift_bodies(
     standing = [b for b in level if leaders[b.name] is b and b.name not in draped]
     land = house_entrances.Land.of(lanes, relief)
     feet = [_in_garden(_foot(body, assets), body, land.ways, assets) for body in standing]
-    corners = np.concatenate(
-        [foot.corners([b.T_world_body]) for foot, b in zip(feet, standing, strict=True)]
-        or [np.zeros((0, 4, 3))]
-    )
+    corners = _corners(feet, [body.T_world_body for body in standing])
     heights = relief.height(corners.reshape(-1, 3)).reshape(-1, 4)
     moves = {
         body.name: _move(foot.stance, points, z, sky_m)
@@ -340,7 +346,7 @@ def _ridden(pose: SE3, yaw_rad: float, relief: Relief) -> SE3:
     x, y, _ = pose.translation_m
     half = (0.5 * _CAR_M[0], 0.5 * _CAR_M[1])
     foot = _Foot("tilted", (-half[0], half[0]), (-half[1], half[1]))
-    corners = foot.corners([SE3.about_z(yaw_rad, (x, y, 0.0))])[0]
+    (corners,) = _corners([foot], [SE3.about_z(yaw_rad, (x, y, 0.0))])
     return _tilt(corners.tolist(), relief.height(corners).tolist())
 
 
@@ -348,7 +354,7 @@ def _lifted_track(
     track: motion.Trajectory, body: Body, assets: AssetLibrary, relief: Relief, sky_m: float
 ) -> motion.Trajectory:
     foot = _foot(body, assets)
-    corners = foot.corners(track.knots)
+    corners = _corners([foot] * len(track.knots), track.knots)
     heights = relief.height(corners.reshape(-1, 3)).reshape(-1, 4)
     knots = tuple(
         _move(foot.stance, points, z, sky_m) @ knot
