@@ -1,7 +1,7 @@
 """Fit of a camera's image pipeline to photographs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -89,6 +89,8 @@ def fit_camera(
             continue
         value = _distribution(quantity, found[k])
         row = results.fitted_quantity(quantity, found[k], float(start[k]), value, quantity.path)
+        if quantity.own is not None:
+            row = replace(row, before=quantity.own(pipeline))
         rows.append(row)
         if row.is_fitted:
             fields += [_field(sensor, key, v, row) for key, v in quantity.fields(value).items()]

@@ -68,6 +68,17 @@ def test_known_parameters_return(fitted: Part, name: str, truth: float, toleranc
 
 
 @pytest.mark.slow
+def test_values_before_a_fit_are_the_ones_of_the_configuration() -> None:
+    """No blur was 0.4 px, where the search begins, and no noise the one of a default sensor."""
+    none = ImagePipeline.model_validate({"image_sensor": None, "focus": None})
+    made = BASE.model_copy(update={"blur_px": Constant(0.25)})
+    for pipeline, expected in ((none, (0.0, None, None)), (made, (0.25, 32500.0, 7.0))):
+        part = fit_to(pipeline, 2, pipeline, 2)
+        rows = tuple(row(part, name).before for name in ("blur", "noise", "read noise"))
+        assert rows == expected
+
+
+@pytest.mark.slow
 def test_read_noise_is_recovered() -> None:
     """From sixty pictures, by 32 scenes, within 25 per cent, and within the stated intervals.
 

@@ -33,11 +33,13 @@ class CameraQuantity:
         statistic: Statistic of each picture, in words.
         path: Path of the field in a sensor.
         measure: The statistic of a picture; NaN = not measurable.
-        start: Coordinate of a pipeline's own, typical value.
+        start: Coordinate at which the search begins, a pipeline's own, typical one.
         apply: The pipeline with one value of the parameter, given by its coordinate.
         to_value: Value in the unit, from the coordinate.
         fields: Values in YAML by dotted path in ``image_pipeline``, for a number or a distribution.
         axis: Range of the coordinate.
+        own: A pipeline's own, typical value in the unit where ``start`` may be another one; None =
+            the pipeline has none.
     """
 
     name: str
@@ -50,6 +52,7 @@ class CameraQuantity:
     fields: Callable[[Any], Mapping[str, Any]]
     axis: indirect_inference.Axis
     to_value: Coordinate = identity
+    own: Callable[[ImagePipeline], float | None] | None = None
 
 
 @dataclass(frozen=True)

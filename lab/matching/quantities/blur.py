@@ -79,4 +79,5 @@ BLUR = CameraQuantity(
     measure, _start, _apply, _fields,
     Axis(0.0, 64.0, step=0.3, plausible=4.0, enough=0.1),
     to_value=to_px,
+    own=lambda pipeline: typical(pipeline.blur_px),
 )  # fmt: skip

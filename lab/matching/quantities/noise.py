@@ -60,6 +60,10 @@ def _start(pipeline: ImagePipeline) -> float:
     return math.log2(sensor.full_well_e)
 
 
+def _own(pipeline: ImagePipeline) -> float | None:
+    return None if pipeline.image_sensor is None else pipeline.image_sensor.full_well_e
+
+
 def to_electrons(coordinate: float) -> float:
     """Electrons of their logarithm, base 2, to three digits."""
     return float(f"{2.0**coordinate:.3g}")
@@ -82,4 +86,5 @@ NOISE = CameraQuantity(
     Axis(math.log2(50.0), math.log2(1e6), step=1.0, plausible=4.0, enough=0.25,
          varies=False, late=True),
     to_value=to_electrons,
+    own=_own,
 )  # fmt: skip

@@ -31,6 +31,11 @@ def _start(pipeline: ImagePipeline) -> float:
     return math.log2(max(own_e, LEAST_E))
 
 
+def _own(pipeline: ImagePipeline) -> float | None:
+    sensor = pipeline.image_sensor
+    return None if sensor is None else base.typical(sensor.read_noise_e)
+
+
 def _apply(pipeline: ImagePipeline, coordinate: float) -> ImagePipeline:
     sensor = pipeline.image_sensor or ImageSensor()
     changed = sensor.model_copy(update={"read_noise_e": Constant(noise.to_electrons(coordinate))})
@@ -48,4 +53,5 @@ READ_NOISE = base.CameraQuantity(
     measure, _start, _apply, _fields,
     Axis(math.log2(LEAST_E), 8.0, step=0.5, plausible=2.0, enough=0.5, varies=False, late=True),
     to_value=noise.to_electrons,
+    own=_own,
 )  # fmt: skip
