@@ -2,7 +2,7 @@
 
 Pictures come from the first step of every view of a configuration, or (``--kitti FOLDER``) from
 ``label_2`` of KITTI's object format. Objects are the rows of KITTI's labels: image boxes around the
-projected 3D box, ``DontCare`` left out. Real figures are of what KITTI's camera sees: the first
+projected 3D box, ``DontCare`` left out. Real figures are of KITTI's camera, so the first
 camera of a configuration takes its size, lens, height and direction, and keeps its place and its
 image pipeline. Pictures are rendered small, since labels need few pixels. ``--light`` adds grey
 levels: pictures with people are rendered again at full size. Real labels have no silhouettes, so
@@ -130,7 +130,7 @@ class _Camera:
 
 
 def as_kitti(camera: RgbCamera, shrunk: int) -> list[str]:
-    """Overrides that give a camera what KITTI's has, in an image smaller by a factor."""
+    """Overrides with size, lens, height and direction of KITTI's camera; the image is smaller."""
     fields = {"size_px": [side // shrunk for side in SIZE_PX], "hfov_deg": HFOV_DEG}
     if camera.rig:
         ahead_m, left_m, _ = camera.offset_m

@@ -60,7 +60,7 @@ class Residuals(nn.Module):
     """Residual network of 0.2 million parameters: features with strides of 4, 8 and 16 pixels.
 
     Attributes:
-        channels: Of the features, from fine to coarse.
+        channels: Numbers of channels, from fine to coarse.
     """
 
     def __init__(self, width: int) -> None:

@@ -24,7 +24,7 @@ class Features(nn.Module):
     """The network without its classifier: features with strides of 4, 8, 16 and 32 pixels.
 
     Attributes:
-        channels: Of the features, from fine to coarse.
+        channels: Numbers of channels, from fine to coarse.
 
     Raises:
         ConfigError: the packages are not installed.
