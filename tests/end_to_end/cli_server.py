@@ -26,7 +26,8 @@ PACKAGES = tuple(
     if module.ispkg and module.name not in ("configs", "generator", "tests", "gen_data")
 )
 LEFT_OUT = (
-    "__main__", "rerun_recording", "study.detector", "study.run_training", "study.training"
+    "__main__", "rerun_recording", "study.detector", "study.pretrained", "study.run_training",
+    "study.training",
 )  # fmt: skip
 """Ends of names of modules that run when imported, or whose libraries start threads, as torch."""
 
