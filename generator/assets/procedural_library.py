@@ -68,7 +68,7 @@ class ProceduralLibrary:
         parts = self._split_draped(asset_id)
         if parts:
             level = self.get(parts[0])
-            digest = _draped_key(level.sha256, parts[1])
+            digest = _draped_key(level.sha256, parts[1], str(family.declares[drape.FACT]))
             return replace(level, asset_id=str(asset_id), sha256=digest)
         if not _is_offered(asset_id, family):
             return self._describe(asset_id, family)
@@ -117,7 +117,7 @@ class ProceduralLibrary:
         if parts:
             level, place = parts
             kind = str(family.declares[drape.FACT])
-            key = _draped_key(self._key(level, family), place)
+            key = _draped_key(self._key(level, family), place, kind)
             return self._store.computed(key, lambda: drape.drape(self.imported(level), place, kind))
 
         def compute() -> importer.ImportedMesh:
@@ -217,8 +217,9 @@ class ProceduralLibrary:
         return asset_cache.content_key(content)
 
 
-def _draped_key(level: str, place: AssetId) -> str:
-    return asset_cache.content_key({"level": level, "place": str(place), "version": drape.VERSION})
+def _draped_key(level: str, place: AssetId, kind: str) -> str:
+    content = {"level": level, "place": str(place), "kind": kind, "version": drape.VERSION}
+    return asset_cache.content_key(content)
 
 
 def _lines_of_object(asset_id: AssetId, family: AnyFamily) -> list[Writing]:
