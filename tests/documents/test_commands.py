@@ -63,8 +63,8 @@ SMALLER = {
     "--n 1380": f"--n 1 {SMALL}", "--n 1600": f"--n 2 {SMALL}",
     "--n 60": f"--n 1 {SMALL} --out out/suction",
     "--n 60 --seed 1 --out out/table": "--n 1 --seed 1 --out out/small",
-    "--n 60 --light 60": "--n 1 --light 1",
-    "--n 300 --light 60 --scans 300": "--n 1 --light 1 --scans 1",
+    "--n 300 --light 30": "--n 1 --light 1", "--n 300 --light 40": "--n 1 --light 1",
+    "--n 300 --light 40 --scans 300": "--n 1 --light 1 --scans 1",
     "--n 60 --html carry_over.html": "--n 2 --html carry_over.html", "--probe 20": "--probe 1",
     "certify out/table": "certify out/table --samples 1 --rays 10 --scenes 0",
 }  # fmt: skip
