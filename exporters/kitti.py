@@ -48,7 +48,7 @@ Readers index ``calib`` by line number and need all printed digits of a rotation
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,9 @@ OFFICIAL_TYPES = {
 """KITTI's types by category. All other categories are ``Misc``, including buses, motorcycles and
 bicycles without riders, for which KITTI has no type."""
 
+PEOPLE = frozenset({"Pedestrian", "Person_sitting"})
+"""Types of people without a vehicle."""
+
 SITTING = frozenset({"sit", "sitting"})
 """Values of the attribute ``pose`` that turn a person into ``Person_sitting``."""
 
@@ -109,7 +112,32 @@ limits of 0.05 to 0.2 and of 0.4 to 0.6 would be as plausible.
 """
 
 
-class Kitti(base.ExporterBase):
+class KittiLabels(base.ExporterBase):
+    """What KITTI's label rows say, and which objects have one."""
+
+    types: Literal["official", "category"] = "official"
+    """KITTI's eight types, or the data set's category names (blanks become underscores)."""
+    boxes: Literal["projected", "tight"] = "projected"
+    """Image boxes: around the projected 3D box, or around the visible pixels."""
+    far_m: float = Field(80.0, gt=0)
+    """Objects farther than this along the optical axis become DontCare."""
+    far_people_m: float | None = Field(None, gt=0)
+    """The same of people, whom annotators recognise less far; None = ``far_m``."""
+    low_px: int = Field(10, ge=2)
+    """Objects with fewer visible pixel rows than this become DontCare."""
+
+    @property
+    def has_own_classes(self) -> bool:
+        """Whether the types are KITTI's."""
+        return self.types == "official"
+
+    def labelled_m(self, kind: str) -> float:
+        """Depth up to which objects of one of KITTI's types have labels."""
+        people_m = self.far_people_m if kind in PEOPLE else None
+        return self.far_m if people_m is None else people_m
+
+
+class Kitti(KittiLabels):
     """KITTI object detection: the images of one camera, with labels in its frame."""
 
     type: Literal["kitti"] = "kitti"
@@ -122,21 +150,8 @@ class Kitti(base.ExporterBase):
     annotators: ClassVar[frozenset[str]] = frozenset({"boxes3d", "visibility"})
     camera: str = ""
     """Sensor that becomes camera 2; empty = the first one, by name, with the rgb channel."""
-    types: Literal["official", "category"] = "official"
-    """KITTI's eight types, or the data set's category names (blanks become underscores)."""
-    boxes: Literal["projected", "tight"] = "projected"
-    """Image boxes: around the projected 3D box, or around the visible pixels."""
-    far_m: float = Field(80.0, gt=0)
-    """Objects farther than this along the optical axis become DontCare."""
-    low_px: int = Field(10, ge=2)
-    """Objects with fewer visible pixel rows than this become DontCare."""
     lidar: str = ""
     """Sensor of the points, lidar or pseudo_lidar; empty = the first one by name, if any."""
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Whether the types are KITTI's."""
-        return self.types == "official"
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -247,41 +262,18 @@ class Kitti(base.ExporterBase):
             boxes=_BOXES[self.boxes],
             truncated="3D box's projection" if self.boxes == "projected" else "silhouette",
             far=self.far_m,
+            people="" if self.far_people_m is None else f" (people: {self.far_people_m:g} m)",
             low=self.low_px,
             partly=PARTLY_OCCLUDED,
             largely=LARGELY_OCCLUDED,
         )
 
 
-class LabelStyle(Protocol):
-    """Options of the labels; see the fields of ``Kitti``."""
-
-    @property
-    def types(self) -> Literal["official", "category"]:
-        """Naming of the types."""
-        ...
-
-    @property
-    def boxes(self) -> Literal["projected", "tight"]:
-        """Content of the image boxes."""
-        ...
-
-    @property
-    def far_m(self) -> float:
-        """Depth beyond which objects are DontCare."""
-        ...
-
-    @property
-    def low_px(self) -> int:
-        """Visible rows below which objects are DontCare."""
-        ...
-
-
 LabelRow = tuple[str, int]
 """A row of a label file, and the id of its instance."""
 
 
-def label_rows(truth: ImageTruth, style: LabelStyle) -> list[LabelRow]:
+def label_rows(truth: ImageTruth, style: KittiLabels) -> list[LabelRow]:
     """Rows of a label file; DontCare rows come last, as readers expect."""
     rows = [
         (label_row(thing, truth, style), thing.instance.instance_id)
@@ -353,7 +345,7 @@ def point_labels(
     return labels
 
 
-def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
+def label_row(thing: ObjectTruth, truth: ImageTruth, style: KittiLabels) -> str:
     """Format the fifteen columns of one visible object.
 
     The row is DontCare if the object is ignored, too far or too small for ``style``, less than two
@@ -367,11 +359,12 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     x, y, z = box.bottom_m
     k = truth.camera.intrinsics
     tiny = thing.box.width_px < 2 or thing.box.height_px < style.low_px
-    unlabelled = thing.ignored or tiny or not 0 < z <= style.far_m
+    instance = thing.instance
+    official = official_type(instance)
+    unlabelled = thing.ignored or tiny or not 0 < z <= style.labelled_m(official)
     if unlabelled or box.corners()[:, 2].min() < NEAR_M:
         return dont_care(thing.box, k)
-    instance = thing.instance
-    kind = official_type(instance) if style.types == "official" else _join_words(instance.category)
+    kind = official if style.types == "official" else _join_words(instance.category)
     alpha_rad = math.remainder(box.heading_rad - math.atan2(x, z), 2.0 * math.pi)
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
     truncation, corners = thing.truncation, _format_corners(thing.box)
@@ -514,7 +507,8 @@ calib       P0 = P1 = P2 = P3, pixel centres at whole numbers; R0_rect = identit
             Boxes turn about the camera's y axis only: each is the smallest such box, headed like
             the object's x axis, around the object's own oriented box.
             left top right bottom: {boxes}.
-            DontCare: farther than {far:g} m, lower than {low} pixels, or without a laser point.
+            DontCare: farther than {far:g} m{people}, lower than {low} pixels, or without a
+            laser point.
             truncated: share of the {truncated} outside the image. occluded, by the hidden share of
             the silhouette inside the image: 0 up to {partly}, 1 up to {largely}, 2 above.
             Metres and radians have six decimals.

@@ -25,13 +25,12 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
 
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Scene
-from gen_data.exporters import base, image_files, kitti, sequences, velodyne
+from gen_data.exporters import image_files, kitti, sequences, velodyne
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.kitti_raw import Latitude, Longitude, projection
 from gen_data.exporters.oxts import navigation_mount, oxts_row, rig_motion
@@ -49,7 +48,7 @@ SLIGHTLY_TRUNCATED, LARGELY_TRUNCATED = 0.15, 0.5
 """Fractions outside above which ``truncated`` is 1 and 2: KITTI's easy and hard limits."""
 
 
-class KittiTracking(base.ExporterBase):
+class KittiTracking(kitti.KittiLabels):
     """KITTI tracking: images, labels, scans and navigation of every sequence."""
 
     type: Literal["kitti_tracking"] = "kitti_tracking"
@@ -71,19 +70,6 @@ class KittiTracking(base.ExporterBase):
     """Device whose pose the navigation rows give; empty = the rig itself."""
     origin_deg: tuple[Latitude, Longitude] = (49.01, 8.43)
     """Latitude and longitude of the world's origin."""
-    types: Literal["official", "category"] = "official"
-    """KITTI's types, or the data set's category names (blanks become underscores)."""
-    boxes: Literal["projected", "tight"] = "projected"
-    """Image boxes: around the projected 3D box, or around the visible pixels."""
-    far_m: float = Field(80.0, gt=0)
-    """Objects farther than this along the optical axis become DontCare."""
-    low_px: int = Field(10, ge=2)
-    """Objects with fewer visible pixel rows than this become DontCare."""
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Whether the types are KITTI's."""
-        return self.types == "official"
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.

@@ -236,6 +236,29 @@ def test_image_boxes_bound_the_projected_boxes_inside_the_image(dataset: Path) -
     assert compared >= 5
 
 
+@pytest.mark.parametrize(
+    ("category", "z_m", "kinds"),
+    [("pedestrian", 49.0, ("Pedestrian", "Pedestrian")), ("pedestrian", 51.0, ("DontCare", "Pedestrian")),
+     ("pedestrian", 65.0, ("DontCare", "DontCare")), ("car", 51.0, ("Car", "Car")),
+     ("cyclist", 51.0, ("Cyclist", "Cyclist")), ("car", 65.0, ("DontCare", "DontCare"))],
+)  # fmt: skip
+def test_people_have_labels_up_to_their_own_distance_if_there_is_one(
+    category: str, z_m: float, kinds: tuple[str, str]
+) -> None:
+    """Annotators recognise people less far than cars."""
+    thing = ObjectTruth(
+        Instance(1, "thing/1", category, 1, "things"),
+        visible_px=200,
+        box=BoxPx(10, 20, 30, 50),
+        box3d_camera=OrientedBox(SE3((0.0, 0.0, z_m)), (1.0, 1.0, 1.7)),
+        occlusion=0.0,
+        truncation=0.0,
+    )
+    styles = kitti.Kitti(far_m=64, far_people_m=50), kitti.Kitti(far_m=64)
+    rows = (kitti.label_row(thing, ImageTruth(CAMERA, ()), style) for style in styles)
+    assert tuple(row.split(" ")[0] for row in rows) == kinds
+
+
 FAR = {"box3d_camera": OrientedBox(SE3((0.0, 0.0, 79.0)), (1.0, 1.0, 1.0))}
 FARTHER = {"box3d_camera": OrientedBox(SE3((0.0, 0.0, 81.0)), (1.0, 1.0, 1.0))}
 BEHIND = {"box3d_camera": OrientedBox(SE3((0.0, 0.0, -0.1)), (1, 1, 1))}
