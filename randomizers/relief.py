@@ -20,9 +20,8 @@ from gen_data.roads.cross_section import RoadShape, strips
 GRADE_MAX = 0.15
 LEVEL_M = 10.0
 """Length of road next to a junction that is as level as the junction."""
-BESIDE_M = 6.0
-"""Width of the land on both sides of a road that is level across, as the road is; more than the
-diagonal of a cell of the relief's grid, over which the road's edge would tilt."""
+BESIDE_M = relief.BESIDE_CELLS * relief.CELL_M
+"""Width of the land on both sides of a road that is level across, as the road is."""
 _MEETING_M = 0.1
 _BENDS_MAX = 3
 _NOTHING = (0.0, 1.0, 0.0)
@@ -95,7 +94,10 @@ class ReliefOfRoads(RandomizerBase):
             not any((p.grade, p.left, p.right, *p.curves[2::3], *p.bends[4::5])) for p in profiles
         ):
             return scene
-        return replace(scene, relief=relief.Relief(tuple(profiles)))
+        ground = relief.Relief(tuple(profiles))
+        more_m = relief.BESIDE_CELLS * ground.cell_m - BESIDE_M
+        wider = (replace(p, half_width_m=round(p.half_width_m + more_m, 2)) for p in profiles)
+        return replace(scene, relief=relief.Relief(tuple(wider)))
 
     def check(self, scene: Scene, assets: interfaces.AssetIndex) -> None:
         """Refuse scenes whose ground it cannot bend."""

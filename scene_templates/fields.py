@@ -21,7 +21,7 @@ Crop = Literal[
     "maize", "wheat", "rape", "stubble", "furrows", "potatoes", "seedlings", "meadow"
 ]  # fmt: skip
 
-_LIFT_M, _LOWEST_M = 0.02, -0.05
+_LIFT_M, _LOWEST_M = 0.05, -0.05
 """Fields lie this far over the land next to the road, and never below the ground around."""
 _BALE_PITCH_M, _BALE_KINDS, _REACH_M = 17.0, 6, 60.0
 """Distance between bales: one per 290 m^2 gives the 35 per hectare of straw that balers report

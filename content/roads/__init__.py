@@ -13,7 +13,7 @@ from gen_data.roads.roundabout_shape import RoundaboutShape
 def _surface(path: str, **parameters: object) -> Family:
     """A surface as streets draw them; those along roads rarely have the same shape twice."""
     build, name = Lazy(f"gen_data.content.roads.{path}"), path.partition(":")[2]
-    facts: dict[str, object] = {"draped": "land" if name == "ground" else "layers"}
+    facts: dict[str, object] = {"draped": "land" if name in ("ground", "fields") else "layers"}
     if name == "road_marking":
         facts["letters"] = Lazy(f"{__name__}.painted_signs:LETTERS")
         facts["writing"] = Lazy(f"{__name__}.road_marking:road_marking_writing")

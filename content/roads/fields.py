@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import cycle, pairwise
 
 import numpy as np
 
@@ -80,27 +80,37 @@ def _materials(slots: dict[str, int], seed: int) -> Iterator[Material]:
 def _cover(
     plan: FieldsShape, parcel: Parcel, high_m: float, slots: dict[str, int]
 ) -> Iterator[Patch]:
-    """The field from above: its headland, its rows and the sprayer's tracks."""
+    """The field from above: its headland, its rows and the sprayer's tracks between them.
+
+    Neighbours share the corners of their edges: no crack opens where the ground bends.
+    """
     first = _STEP_M if high_m else 0.0
     rows = _rows(plan, parcel)
-    slot, lift = slots[parcel.crop], 0.95 * high_m
-    bounds = (first, _HEADLAND_M, plan.depth_m) if parcel.across else (first, plan.depth_m)
-    for k in range(len(bounds) - 1):
-        along = parcel.across and k > 0
-        yield _sheet(plan, rows, (bounds[k], bounds[k + 1]), lift, slot, turned=along)
+    crop, z_m = slots[parcel.crop], 0.95 * high_m
     pitch = _TRAMLINES.get(parcel.crop, 0.0)
-    if not pitch:
-        return
-    dark = slots["tramline"]
+    strips_of = (crop, slots["tramline"]) if pitch else (crop,)
     if parcel.across:
-        for s in np.arange(parcel.start_m + 0.5 * pitch, parcel.end_m - 2.0, pitch):
-            for at in (s - 0.9, s + 0.9):
-                ends = np.array([at - 0.2, at + 0.2])
-                yield _sheet(plan, ends, (_HEADLAND_M, plan.depth_m), lift + _LIFT_M, dark)
+        cuts = _strip_edges(parcel.start_m, parcel.end_m, pitch, parcel.start_m)
+        # Rows next to an edge would make slivers.
+        inner = rows[np.abs(rows[:, None] - cuts).min(axis=1) > 0.02]
+        rows = np.union1d(inner, cuts)
+        yield _sheet(plan, rows, (first, _HEADLAND_M), z_m, crop)
+        for (low, high), slot in zip(pairwise(cuts), cycle(strips_of), strict=False):
+            part = rows[(rows >= low) & (rows <= high)]
+            yield _sheet(plan, part, (_HEADLAND_M, plan.depth_m), z_m, slot, turned=True)
         return
-    for away in np.arange(0.5 * pitch, plan.depth_m - 2.0, pitch):
-        for at in (away - 0.9, away + 0.9):
-            yield _sheet(plan, rows, (at - 0.2, at + 0.2), lift + _LIFT_M, dark)
+    cuts = _strip_edges(first, plan.depth_m, plan.depth_m, pitch)
+    for (low, high), slot in zip(pairwise(cuts), cycle(strips_of), strict=False):
+        yield _sheet(plan, rows, (low, high), z_m, slot)
+
+
+def _strip_edges(low_m: float, high_m: float, pitch_m: float, origin_m: float) -> Array:
+    """Both ends, and between them the edges of the wheels' tracks, if there are any."""
+    if not pitch_m:
+        return np.array([low_m, high_m])
+    middles = np.arange(origin_m + 0.5 * pitch_m, high_m - 2.0, pitch_m)
+    edges = (middles[:, None] + [-1.1, -0.7, 0.7, 1.1]).ravel()
+    return np.concatenate([[low_m], edges, [high_m]])
 
 
 def _rows(plan: FieldsShape, parcel: Parcel) -> Array:

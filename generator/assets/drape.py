@@ -14,18 +14,20 @@ from gen_data.assets.asset_ids import AssetId
 from gen_data.assets.importer import ImportedMesh
 from gen_data.core.asset_types import ConvexParts, Keypoint, MeshData
 from gen_data.core.errors import AssetError
-from gen_data.core.relief import CELL_M, Relief
+from gen_data.core.relief import Relief
 from gen_data.core.se3 import SE3, Array
 
 Ints = NDArray[np.integer]
 
-VERSION = 1
+VERSION = 2
 """Raised whenever the same arguments make other bytes."""
 FACT = "draped"
 """Families declare under this name how their meshes follow the ground: ``layers`` are cut along the
 lines of its grid, and stay as far apart as they are on level ground; ``land`` is divided only where
 it would deviate from the ground by more than ``LAND_M``."""
 LAND_M = 0.02
+_ALONG = (0.5, 0.25, 0.75)
+"""Where edges are compared with the ground; land that rises and falls again crosses their middles."""
 _ROUNDS = 12
 _KEYS = ("at", "relief")
 _NEAR = 1e-7
@@ -167,7 +169,7 @@ def _draped_mesh(mesh: MeshData, ground: _Ground, divide: _Cut) -> MeshData:
 
 
 def _refined(corners: Array, faces: Ints, slots: Ints, ground: _Ground) -> tuple[Array, Ints, Ints]:
-    """Halve edges whose middles are too far from the ground; neighbours agree on every edge."""
+    """Halve edges that are too far from the ground; neighbours agree on every edge."""
     done_faces, done_slots = [], []
     height = ground.height(corners[:, :3])
     for _ in range(_ROUNDS):
@@ -175,14 +177,15 @@ def _refined(corners: Array, faces: Ints, slots: Ints, ground: _Ground) -> tuple
         key = np.minimum(one, other) * len(corners) + np.maximum(one, other)
         key, which = np.unique(key, return_inverse=True)
         one, other = np.divmod(key, len(corners))
-        between = ground.height(0.5 * (corners[one, :3] + corners[other, :3]))
-        off = between - 0.5 * (height[one] + height[other])
-        halved = np.flatnonzero(np.abs(off) > LAND_M)
+        start, end = corners[one, :3], corners[other, :3]
+        between = np.stack([ground.height((1.0 - u) * start + u * end) for u in _ALONG])
+        chords = np.stack([(1.0 - u) * height[one] + u * height[other] for u in _ALONG])
+        halved = np.flatnonzero((np.abs(between - chords) > LAND_M).any(axis=0))
         number = np.full(len(key), -1)
         number[halved] = len(corners) + np.arange(len(halved))
         middles = 0.5 * (corners[one[halved]] + corners[other[halved]])
         corners = np.concatenate([corners, middles])
-        height = np.concatenate([height, between[halved]])
+        height = np.concatenate([height, between[0, halved]])
         inner = number[which.reshape(-1, 3)]
         # Nothing will divide a triangle whose edges are all near enough.
         active = (inner >= 0).any(axis=1)
@@ -220,7 +223,7 @@ def _cut_on_grid(
     """Cut along the lines of the grid and the diagonals of its cells."""
     x, y = np.zeros((2, 0))
     for along_x, along_y in ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0)):
-        new_x, new_y = (ground.plan(corners[len(x) :]) / CELL_M).T
+        new_x, new_y = (ground.plan(corners[len(x) :]) / ground.relief.cell_m).T
         x, y = np.concatenate([x, new_x]), np.concatenate([y, new_y])
         corners, faces, slots = _cut(corners, along_x * x + along_y * y, faces, slots)
     return corners, faces, slots

@@ -20,7 +20,12 @@ Ints = NDArray[np.int64]
 CELL_M = 4.0
 """Cells of the grid. On a crest of K = 2, the tightest one at 30 km/h, the planes are up to 10 mm
 below the parabola; whatever stands on the ground stands on the planes."""
-_END_M = 1.5 * CELL_M
+WIDE_CELL_M, GENTLE_M, WIDE_BEND_M = 8.0, 3000.0, 500.0
+"""Cells of gentle roads, such as motorways, and their smallest radii, of vertical curves and in
+plan: planes are up to 3 mm below a parabola, and meshes have half of the faces."""
+BESIDE_CELLS = 1.5
+"""Cells for which a road goes on, or is level, beyond its edges: more than the diagonal of a cell,
+over which the edge would tilt."""
 _REACH_M = 160.0
 """Distance from all roads beyond which the ground has the height of its rim."""
 _SOFT_M2 = 0.25
@@ -66,12 +71,13 @@ class RoadProfile:
     curves: tuple[float, float, float, float, float, float, float, float, float]
     bends: tuple[float, ...] = ()
 
-    def height(self, s_m: Array) -> Array:
+    def height(self, s_m: Array, cell_m: float = CELL_M) -> Array:
         """Heights [n] at arc lengths [n] of the reference line, constant beyond its ends.
 
-        Both end grades go on for a little more than the diagonal of a cell, in which the road ends.
+        Both end grades go on for ``BESIDE_CELLS``.
         """
-        s = np.clip(s_m, -_END_M, self.length_m + _END_M)
+        end_m = BESIDE_CELLS * cell_m
+        s = np.clip(s_m, -end_m, self.length_m + end_m)
         z: Array = self.start_m + self.grade * s
         for start, length, change in self._bends():
             z = z + change * _bend(s - start, length)
@@ -87,22 +93,32 @@ class RoadProfile:
     def _bends(self) -> Iterator[tuple[float, float, float]]:
         return zip(self.curves[0::3], self.curves[1::3], self.curves[2::3], strict=True)
 
+    @property
+    def is_gentle(self) -> bool:
+        """Whether wide cells are near to it."""
+        crests = (length / abs(k) >= GENTLE_M for _, length, k in self._bends() if k)
+        bends = (0.0, *(k for _, _, _, k, _ in self._turns()))
+        return all(crests) and all(
+            abs(self.curvature_per_m + k) <= 1.0 / WIDE_BEND_M for k in bends
+        )
+
     def line(self) -> Array:
         """Points [n, 2] of its reference line, a few metres apart."""
         return _stations(self)[:, 1:3]
 
-    def weigh(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
+    def weigh(self, x_m: Array, y_m: Array, cell_m: float) -> tuple[Array, Array]:
         """Its heights on a grid [m, n], and their weights, which fall with the distance from it.
 
         Args:
             x_m: Places of the rows, [m, 1].
             y_m: Places of the columns, [1, n].
+            cell_m: Their distance.
         """
         s, t = self._along_and_left(x_m, y_m)
         beyond = s - np.clip(s, 0.0, self.length_m)
         aside = np.maximum(np.abs(t) - self.half_width_m, 0.0)
         weight = 1.0 / np.square(beyond * beyond + aside * aside + _SOFT_M2)
-        height = self.height(s) + self._bank(s, t) + self._land(t)
+        height = self.height(s, cell_m) + self._bank(s, t) + self._land(t)
         if self.bends:
             # Where legs of the road are equally near, the nearest one would change at a step.
             first, last = self._inside_m()
@@ -208,6 +224,11 @@ class Relief:
 
     roads: tuple[RoadProfile, ...]
 
+    @property
+    def cell_m(self) -> float:
+        """Cells of its grid."""
+        return WIDE_CELL_M if all(road.is_gentle for road in self.roads) else CELL_M
+
     def height(self, points_m: Array) -> Array:
         """Heights [n] of the ground at places [n, 2 or more], x and y first."""
         grid = _sampled(self)
@@ -291,11 +312,13 @@ class _Grid:
     """The smooth ground at the nodes of the grid, as far as roads shape it.
 
     Attributes:
-        first: Numbers of the first node along x and y; node k is at ``k * CELL_M``.
+        cell_m: Distance of nodes.
+        first: Numbers of the first node along x and y; node k is at ``k * cell_m``.
         heights_m: [m, n].
         slopes: Along x and along y, [2, m, n].
     """
 
+    cell_m: float
     first: Array
     heights_m: Array
     slopes: Array
@@ -311,7 +334,7 @@ class _Grid:
         cells, shares = [], []
         # Axis by axis: numpy is slow on the short axis of [n, 2].
         for axis, count in enumerate(self.heights_m.shape):
-            at = points[:, axis] / CELL_M - self.first[axis]
+            at = points[:, axis] / self.cell_m - self.first[axis]
             at = np.minimum(np.maximum(at, 0.0), count - 1.0)
             cell = np.minimum(np.floor(at), count - 2.0)
             cells.append(cell.astype(np.int64))
@@ -345,13 +368,14 @@ class _Grid:
 @lru_cache(maxsize=4)
 def _sampled(relief: Relief) -> _Grid:
     """The grid of a relief, which all meshes, lanes and bodies of a scene ask."""
+    cell_m = relief.cell_m
     lines = np.concatenate([road.line() for road in relief.roads])
-    first = np.floor((lines.min(axis=0) - _REACH_M) / CELL_M)
-    last = np.ceil((lines.max(axis=0) + _REACH_M) / CELL_M)
-    x, y = (CELL_M * np.arange(a, b + 1.0) for a, b in zip(first, last, strict=True))
-    weighed = [road.weigh(x[:, None], y[None]) for road in relief.roads]
+    first = np.floor((lines.min(axis=0) - _REACH_M) / cell_m)
+    last = np.ceil((lines.max(axis=0) + _REACH_M) / cell_m)
+    x, y = (cell_m * np.arange(a, b + 1.0) for a, b in zip(first, last, strict=True))
+    weighed = [road.weigh(x[:, None], y[None], cell_m) for road in relief.roads]
     total = sum(weight for _, weight in weighed)
     # Rounded as poses are: the same bits on every processor.
     heights = np.round(sum(height * weight for height, weight in weighed) / total, 6)
-    slopes = np.stack([np.gradient(heights, CELL_M, axis=k) for k in (0, 1)])
-    return _Grid(first, heights, slopes)
+    slopes = np.stack([np.gradient(heights, cell_m, axis=k) for k in (0, 1)])
+    return _Grid(cell_m, first, heights, slopes)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,31 @@ def test_ground_of_a_road_is_its_profile_and_level_across() -> None:
         off = CREST.height(s) - Relief((CREST,)).height(np.column_stack([s, np.full(400, t)]))
         assert off.max() <= sagitta_m + 1e-4
         assert off.min() >= -1e-4
+
+
+LONG = replace(CREST, length_m=2000.0, half_width_m=20.0, left=0.0, right=0.0, grade=0.02,
+               curves=(100.0, 300.0, -0.1, 600.0, 300.0, 0.05, *NOTHING))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("roads", "cell_m", "below_mm"),
+    [((LONG,), 8.0, 2.7), ((LONG, replace(CREST, y_m=400.0)), 4.0, 0.7),
+     ((replace(LONG, curvature_per_m=0.0019),), 8.0, 5.4),
+     ((replace(LONG, bends=(9.0, 30.0, 30.0, 0.003, 0.0)),), 4.0, 1.4),
+     ((replace(LONG, curves=(100.0, 299.0, -0.1, *NOTHING * 2)),), 4.0, 0.7)],
+)  # fmt: skip
+def test_gentle_roads_have_wider_cells(
+    roads: tuple[RoadProfile, ...], cell_m: float, below_mm: float
+) -> None:
+    """R = 3000 m: a chord of 8 m is 2.7 mm below the crest, a diagonal 5.4 mm; one road decides."""
+    ground = Relief(roads)
+    assert ground.cell_m == cell_m
+    s = np.linspace(100.0, 400.0, 900)
+    places = roads[0].line()
+    at = np.linspace(0.0, roads[0].length_m, len(places))
+    x, y = (np.interp(s, at, places[:, k]) for k in (0, 1))
+    off_mm = 1e3 * (roads[0].height(s) - ground.height(np.column_stack([x, y])))
+    assert off_mm.max() <= below_mm + 0.1
 
 
 def test_land_rises_on_one_side_and_falls_on_the_other() -> None:
