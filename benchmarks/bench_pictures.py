@@ -154,7 +154,7 @@ def _camera(name: str, given: Sequence[str], shrunk: int, channels: str) -> Iter
         "steps_per_scene=1",
     ]
     kitti = next(
-        (e for e in config.exporters if isinstance(e, Kitti)), Kitti(far_m=64, far_people_m=50)
+        (e for e in config.exporters if isinstance(e, Kitti)), Kitti(far_m=64, far_people_m=45)
     )
     style = kitti.model_copy(update={"low_px": math.ceil(kitti.low_px / shrunk)})
     with open_pipeline(load_config(name, overrides=[*given, *changes])) as pipeline:
