@@ -9,7 +9,8 @@ The source is a finished data set, or a recipe or configuration, which is render
 only images of the split ``train`` are trained on. ``--eval`` is a folder with annotations in COCO's
 format (``annotations/*.json`` or ``*.json``, of which ``--split`` names one) and their images
 anywhere below it. Classes are matched by name. The result is COCO's AP with a 95 % confidence
-interval from bootstrapping over images. ``--load`` with a source trains that detector further.
+interval from bootstrapping over images. ``--load`` with a source trains that detector further, also
+at another ``--size``.
 """
 
 import argparse
@@ -31,7 +32,7 @@ from gen_data.lab.study.training import detect_all, fit
 from gen_data.runner.recipe import is_recipe
 from gen_data.targets import detection_target
 
-KEPT_BYTES = 2e9
+KEPT_BYTES = 4e9
 """Largest images of a data set, together, that are kept in memory."""
 
 
@@ -96,12 +97,14 @@ def train(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Detecto
     """Train for ``--minutes`` or ``--steps``, whichever ends first."""
     torch.manual_seed(args.seed)
     if args.load is None:
-        model = Detector(samples.categories, args.size, args.width, pretrained=args.pretrained)
+        size_px, width = args.size or 256, args.width or 16
+        model = Detector(samples.categories, size_px, width, pretrained=args.pretrained)
     else:
         model = Detector.load(args.load)
         if model.classes != tuple(samples.categories):
             raise SystemExit(f"{args.load} has the classes {', '.join(model.classes)}; the source "
                              f"has {', '.join(samples.categories)}")  # fmt: skip
+        model.size_px = args.size or model.size_px
     started_s = time.monotonic()
 
     def used(step: int) -> float:
@@ -148,8 +151,12 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--split", default="", help="part of the name of the annotation file")
     parser.add_argument("--minutes", type=float, default=15.0, help="longest time of training")
     parser.add_argument("--steps", type=float, default=float("inf"), help="most training steps")
-    parser.add_argument("--size", type=int, default=256, help="longest side of its images [px]")
-    parser.add_argument("--width", type=int, default=16, help="channels of its finest features")
+    parser.add_argument(
+        "--size", type=int, help="longest side of its images [px]; 256, or that of --load"
+    )
+    parser.add_argument(
+        "--width", type=int, help="channels of its finest features; 16, or those of --load"
+    )
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--epoch-size", type=int, default=2000, help="samples, for configurations")
     parser.add_argument("--workers", type=int, default=1, help="processes that read or render")
@@ -160,6 +167,12 @@ def parse_arguments() -> argparse.Namespace:
     args = parser.parse_args()
     if args.source is None and args.load is None:
         parser.error("give a source to train on, or --load")
+    if args.load is not None and (args.pretrained or args.width):
+        parser.error(
+            "the detector of --load has its features already: leave out --pretrained and --width"
+        )
+    if args.source is None and args.size:
+        parser.error("--size is of training: give a source to train on")
     return args
 
 

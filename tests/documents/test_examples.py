@@ -13,7 +13,8 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 
 
-def run(folder: Path, *arguments: str, path: str = "") -> str:
+def run(folder: Path, *arguments: str, path: str = "", code: int = 0) -> str:
+    """What it prints; errors, if it ends with another code than 0."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
     done = subprocess.run(
         [sys.executable, *arguments],
@@ -24,8 +25,8 @@ def run(folder: Path, *arguments: str, path: str = "") -> str:
         check=False,
         timeout=600,
     )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stderr if code else done.stdout
 
 
 @pytest.mark.slow
@@ -55,6 +56,8 @@ def test_the_detector_learns_and_is_stored(tmp_path: Path) -> None:
 
     The data set also holds depth and label images, whose names are those of the photographs.
     """
+    import torch
+
     options = (
         "--n", "8", "--workers", "0", "--seed", "4", "--out", "set",
         "--set", "sensors.color.size_px=[160, 120]", "--set", "splits={train: 1, val: 0, test: 0}",
@@ -78,6 +81,21 @@ def test_the_detector_learns_and_is_stored(tmp_path: Path) -> None:
     losses = [float(line.split()[-1]) for line in lines if ": loss " in line]
     assert len(losses) == 10
     assert losses[-1] < 0.5 * losses[0]
+
+    # Trained further at another size, it keeps its features; options without an effect are errors.
+    more = ("--load", "detector.pt", "--eval", "set/coco", "--bootstrap", "20")
+    run(tmp_path, script, "set", *more, "--size", "96", "--steps", "2", "--workers", "0", "--save",
+        "small.pt")  # fmt: skip
+    stored = [torch.load(tmp_path / name) for name in ("detector.pt", "small.pt")]
+    assert [file["size_px"] for file in stored] == [160, 96]
+    assert stored[0]["width"] == stored[1]["width"] == 16
+    for wrong, named in (
+        (("set", "--width", "24"), "leave out --pretrained and --width"),
+        (("set", "--pretrained"), "leave out --pretrained and --width"),
+        (("--size", "96"), "give a source to train on"),
+    ):
+        message = run(tmp_path, script, *wrong, *more, code=2)
+        assert named in message
 
 
 NOTEBOOK = {"[320, 240]": "[96, 72]", "N = 20": "N = 5", "MOST_STEPS = 20": "MOST_STEPS = 2"}

@@ -58,6 +58,15 @@ def test_cocos_splits_keep_apart_images_of_one_name(label: str, image: str, tmp_
     }
 
 
+@pytest.mark.parametrize("other", ["instance", "instances", "depth", "category"])
+def test_label_images_of_the_same_names_are_no_photographs(other: str, tmp_path: Path) -> None:
+    """An export has them in folders of their own; ``instances_train.json`` names a split alone."""
+    coco(tmp_path / "annotations/instances_train.json", {"bbox": [1, 1, 5, 5]})
+    for folder in (f"{other}/train", "train"):
+        write_picture(tmp_path / folder / "1.png")
+    assert found(tmp_path) == {"train/1.png": 1}
+
+
 def test_a_split_may_be_a_folder(tmp_path: Path) -> None:
     """The validation set judges, if no split is given."""
     for split in ("train", "valid"):
