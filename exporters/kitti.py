@@ -122,7 +122,7 @@ class KittiLabels(base.ExporterBase):
     far_m: float = Field(80.0, gt=0)
     """Objects farther than this along the optical axis become DontCare."""
     far_people_m: float | None = Field(None, gt=0)
-    """The same of people, whom annotators recognise less far; None = ``far_m``."""
+    """As ``far_m``, for people, whom annotators recognise less far; None = ``far_m``."""
     low_px: int = Field(10, ge=2)
     """Objects with fewer visible pixel rows than this become DontCare."""
 

@@ -27,7 +27,7 @@ lines of its grid, and stay as far apart as they are on level ground; ``land`` i
 it would deviate from the ground by more than ``LAND_M``."""
 LAND_M = 0.02
 _ALONG = (0.5, 0.25, 0.75)
-"""Where edges are compared with the ground; land that rises and falls again crosses their middles."""
+"""Where edges are compared with the ground; a rise and a fall may cross at their middles."""
 _ROUNDS = 12
 _KEYS = ("at", "relief")
 _NEAR = 1e-7

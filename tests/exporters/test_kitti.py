@@ -238,7 +238,8 @@ def test_image_boxes_bound_the_projected_boxes_inside_the_image(dataset: Path) -
 
 @pytest.mark.parametrize(
     ("category", "z_m", "kinds"),
-    [("pedestrian", 49.0, ("Pedestrian", "Pedestrian")), ("pedestrian", 51.0, ("DontCare", "Pedestrian")),
+    [("pedestrian", 49.0, ("Pedestrian", "Pedestrian")),
+     ("pedestrian", 51.0, ("DontCare", "Pedestrian")),
      ("pedestrian", 65.0, ("DontCare", "DontCare")), ("car", 51.0, ("Car", "Car")),
      ("cyclist", 51.0, ("Cyclist", "Cyclist")), ("car", 65.0, ("DontCare", "DontCare"))],
 )  # fmt: skip
