@@ -152,11 +152,9 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--minutes", type=float, default=15.0, help="longest time of training")
     parser.add_argument("--steps", type=float, default=float("inf"), help="most training steps")
     parser.add_argument(
-        "--size", type=int, help="longest side of its images [px]; 256, or that of --load"
+        "--size", type=int, help="longest side of its images [px]; default 256, or as of --load"
     )
-    parser.add_argument(
-        "--width", type=int, help="channels of its finest features; 16, or those of --load"
-    )
+    parser.add_argument("--width", type=int, help="channels of its finest features; default 16")
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--epoch-size", type=int, default=2000, help="samples, for configurations")
     parser.add_argument("--workers", type=int, default=1, help="processes that read or render")

@@ -113,7 +113,7 @@ limits of 0.05 to 0.2 and of 0.4 to 0.6 would be as plausible.
 
 
 class KittiLabels(base.ExporterBase):
-    """What KITTI's label rows say, and which objects have one."""
+    """Contents of KITTI's label rows, and which objects have one."""
 
     types: Literal["official", "category"] = "official"
     """KITTI's eight types, or the data set's category names (blanks become underscores)."""

@@ -351,7 +351,7 @@ def _find_image(
     """
     name = Path(stated)
     found = [p for p in known.get(name.name, []) if p.parts[-len(name.parts) :] == name.parts]
-    # The first word of instances_train.json says what it lists; it is no split.
+    # The word `instances` stands for the kind of labels, not for a split.
     words = set(re.split(r"[\W_]+", annotations.stem.casefold())) - {"instances"}
 
     def rank(path: Path) -> tuple[bool, int, bool, int]:

@@ -14,7 +14,7 @@ EXAMPLES = ROOT / "examples"
 
 
 def run(folder: Path, *arguments: str, path: str = "", code: int = 0) -> str:
-    """What it prints; errors, if it ends with another code than 0."""
+    """Its output; its errors, if it ends with another code than 0."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
     done = subprocess.run(
         [sys.executable, *arguments],

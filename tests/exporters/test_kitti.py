@@ -247,8 +247,8 @@ def test_people_have_labels_up_to_their_own_distance_if_there_is_one(
     category: str, z_m: float, kinds: tuple[str, str]
 ) -> None:
     """Annotators recognise people less far than cars."""
-    thing = ObjectTruth(
-        Instance(1, "thing/1", category, 1, "things"),
+    one = ObjectTruth(
+        Instance(1, "group/1", category, 1, "group"),
         visible_px=200,
         box=BoxPx(10, 20, 30, 50),
         box3d_camera=OrientedBox(SE3((0.0, 0.0, z_m)), (1.0, 1.0, 1.7)),
@@ -256,7 +256,7 @@ def test_people_have_labels_up_to_their_own_distance_if_there_is_one(
         truncation=0.0,
     )
     styles = kitti.Kitti(far_m=64, far_people_m=50), kitti.Kitti(far_m=64)
-    rows = (kitti.label_row(thing, ImageTruth(CAMERA, ()), style) for style in styles)
+    rows = (kitti.label_row(one, ImageTruth(CAMERA, ()), style) for style in styles)
     assert tuple(row.split(" ")[0] for row in rows) == kinds
 
 

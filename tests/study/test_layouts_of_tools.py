@@ -60,7 +60,7 @@ def test_cocos_splits_keep_apart_images_of_one_name(label: str, image: str, tmp_
 
 @pytest.mark.parametrize("other", ["instance", "instances", "depth", "category"])
 def test_label_images_of_the_same_names_are_no_photographs(other: str, tmp_path: Path) -> None:
-    """An export has them in folders of their own; ``instances_train.json`` names a split alone."""
+    """An export has a folder for each kind; ``instances_train.json`` names one split."""
     coco(tmp_path / "annotations/instances_train.json", {"bbox": [1, 1, 5, 5]})
     for folder in (f"{other}/train", "train"):
         write_picture(tmp_path / folder / "1.png")
