@@ -15,6 +15,7 @@ SMALL = (
     "sensors[1].model=VLP-16",
     "sensors[1].ideal=true",
     "sensors[1].motion_distortion=none",
+    "sensors[1].divergence=false",
     "sensors[2].size_px=[64, 32]",
 )
 
