@@ -115,6 +115,7 @@ limits of 0.05 to 0.2 and of 0.4 to 0.6 would be as plausible.
 class KittiLabels(base.ExporterBase):
     """Contents of KITTI's label rows, and which objects have one."""
 
+    annotators: ClassVar[frozenset[str]] = frozenset({"boxes3d", "visibility"})
     types: Literal["official", "category"] = "official"
     """KITTI's eight types, or the data set's category names (blanks become underscores)."""
     boxes: Literal["projected", "tight"] = "projected"
@@ -147,7 +148,6 @@ class Kitti(KittiLabels):
         lens=PINHOLE,
         intensity="0 to 1",
     )
-    annotators: ClassVar[frozenset[str]] = frozenset({"boxes3d", "visibility"})
     camera: str = ""
     """Sensor that becomes camera 2; empty = the first one, by name, with the rgb channel."""
     lidar: str = ""

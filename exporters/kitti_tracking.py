@@ -59,7 +59,6 @@ class KittiTracking(kitti.KittiLabels):
         time="number of the frame",
         intensity="0 to 1",
     )
-    annotators: ClassVar[frozenset[str]] = frozenset({"boxes3d", "visibility"})
     camera: str = ""
     """Sensor that becomes camera 02; empty = the first one, by name, with the rgb channel."""
     right_camera: str = ""

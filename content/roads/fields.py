@@ -21,7 +21,7 @@ HEIGHTS_M = {"maize": 2.3, "wheat": 0.82, "rape": 1.4}
 _HEADLAND_M, _STEP_M = 9.0, 0.8
 _TRAMLINES = {"wheat": 18.0, "rape": 18.0, "seedlings": 18.0, "maize": 0.0}
 """Distance of the sprayer's tracks [m], a multiple of the drill's 3 m (assumed); 0 = none."""
-_LIFT_M = 0.03
+_TRACK_LIFT_M = 0.015
 
 
 def fields(**shape: float | str) -> Solid:
@@ -178,7 +178,7 @@ def _track(plan: FieldsShape, start_m: float, slot: int) -> Patch:
         [start_m, start_m + TRACK_M], [-1.0, 0.5 * plan.depth_m, plan.depth_m], indexing="ij"
     )
     uv = np.stack([(s - start_m) / TRACK_M, away / lane_textures.TILE_M], axis=2)
-    return _laid(plan, s, away, np.full(s.shape, 0.5 * _LIFT_M), uv, slot)
+    return _laid(plan, s, away, np.full(s.shape, _TRACK_LIFT_M), uv, slot)
 
 
 def _slab(plan: FieldsShape) -> Array:

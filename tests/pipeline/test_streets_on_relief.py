@@ -24,14 +24,14 @@ from tests.street_ground import Street
 from tests.streets import HILLS, STRAIGHT, thin_street
 
 STREET = (*STRAIGHT, "sensors.color.size_px=[160, 96]")
+HILLY_STREET = (*STREET, *HILLS, "views_per_scene=1", "randomizers.people.count=0")
+"""Without people: one far away is narrower than a pixel, which shows the ground behind."""
 FLAT = ("relief",)
 
 
 @pytest.fixture(scope="module")
 def hilly_samples() -> Iterator[tuple[Pipeline, list[Sample]]]:
-    # A person far away is narrower than a pixel, which shows the ground behind.
-    options = (*STREET, *HILLS, "views_per_scene=1", "randomizers.people.count=0")
-    config = thin_street("street.yaml", *options)
+    config = thin_street("street.yaml", *HILLY_STREET)
     with open_pipeline(config, frozenset({Channel.RANGE, Channel.INSTANCE})) as pipeline:
         yield pipeline, [pipeline.sample(number) for number in range(3)]
 
@@ -141,9 +141,7 @@ def test_samples_on_relief_do_not_depend_on_the_order_of_their_making(
 ) -> None:
     """Sample 1 of a pipeline that made no other one has the same scene and the same pixels."""
     _, samples = hilly_samples
-    # A person far away is narrower than a pixel, which shows the ground behind.
-    options = (*STREET, *HILLS, "views_per_scene=1", "randomizers.people.count=0")
-    config = thin_street("street.yaml", *options)
+    config = thin_street("street.yaml", *HILLY_STREET)
     with open_pipeline(config, frozenset({Channel.RANGE, Channel.INSTANCE})) as pipeline:
         again = pipeline.sample(1)
     assert serialization.to_plain(again.scene) == serialization.to_plain(samples[1].scene)
