@@ -32,7 +32,7 @@ from gen_data.lab.study.training import detect_all, fit
 from gen_data.runner.recipe import is_recipe
 from gen_data.targets import detection_target
 
-KEPT_BYTES = 4e9
+KEPT_BYTES = 6e9
 """Largest images of a data set, together, that are kept in memory."""
 
 
