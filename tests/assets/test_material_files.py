@@ -179,6 +179,15 @@ def test_a_blended_image_is_opacity_and_holes(folder: Path) -> None:
     np.testing.assert_array_equal(texture.alpha >= 128, veil[..., 3] > 0)
 
 
+@pytest.mark.parametrize(("mode", "opacity"), [("OPAQUE", 1.0), ("BLEND", 0.5)])
+def test_a_gltf_cutoff_counts_in_masks_only(folder: Path, mode: str, opacity: float) -> None:
+    """Beyond 1 it hides a mask; OPAQUE ignores alpha, too."""
+    alpha = 0.5 if mode == "BLEND" else 2.0
+    factors = {"baseColorFactor": [1, 1, 1, alpha]}
+    gltf(folder, {"alphaMode": mode, "alphaCutoff": 1.5, "pbrMetallicRoughness": factors})
+    assert loaded(folder)[0].opacity == opacity
+
+
 def test_mtl_says_opacity_light_coat_and_holes(folder: Path) -> None:
     """``d`` takes precedence over ``Tr``; a separate coverage image is grey."""
     triangle(

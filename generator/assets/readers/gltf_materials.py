@@ -173,17 +173,18 @@ def _read_alpha(
     A blended image gets its mean coverage outside its holes as opacity; uncovered texels are holes.
     """
     mode = description.get("alphaMode", "OPAQUE")
+    if mode not in ("BLEND", "MASK"):
+        return "", 0.5, 1.0
     name = _image_name(pbr, "baseColorTexture", images)
     factor = fraction(factor, "baseColorFactor's alpha")
-    cutoff = fraction(description.get("alphaCutoff", 0.5), "alphaCutoff")
-    cover = images.pixels(name) if name and mode != "OPAQUE" else None
+    cover = images.pixels(name) if name else None
     seen = cover is not None and cover.shape[2] == 4
     if mode == "MASK":
+        # Beyond 1, nothing is seen.
+        cutoff = clamp_min(0.0, description.get("alphaCutoff", 0.5), "alphaCutoff")
         # The threshold applies to image times factor; here the image alone is compared.
         needed = min(cutoff / max(factor, 1e-6), 1.0)
         return (f"{name}!3" if seen else "", needed, 1.0 if factor >= cutoff else 0.0)
-    if mode != "BLEND":
-        return "", 0.5, 1.0
     if cover is None or not seen:
         return "", 0.5, round(factor, 4)
     covered = cover[..., 3][cover[..., 3] >= _MIN_COVERAGE]
