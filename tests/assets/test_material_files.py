@@ -156,6 +156,21 @@ def test_gltf_images_become_maps(folder: Path) -> None:
     np.testing.assert_array_equal(texture.alpha >= 128, leaf[..., 3] >= 0.25 * 255)
 
 
+def test_gltf_scales_of_normals_and_occlusion_apply(folder: Path) -> None:
+    """A normal (0.6, 0, 0.8) at scale 0.5 is (0.3, 0, 0.8) normalised; occlusion 1 + s (o - 1)."""
+    tilt = np.rint((np.array([0.6, 0.0, 0.8]) + 1.0) * 127.5)
+    normals = np.broadcast_to(tilt, (4, 4, 3)).astype(np.uint8)
+    shade = np.dstack([checker(55, 255)] * 3)
+    gltf(folder, {"normalTexture": {"index": 0, "scale": 0.5},
+                  "occlusionTexture": {"index": 1, "strength": 0.25}},
+         normals=normals, shade=shade)  # fmt: skip
+    _, texture = loaded(folder)
+    assert texture is not None and texture.normal is not None
+    found = texture.normal[0, 0] / 127.5 - 1.0
+    assert found == pytest.approx(np.array([0.3, 0.0, 0.8]) / np.hypot(0.3, 0.8), abs=0.012)
+    np.testing.assert_array_equal(texture.occlusion, checker(205, 255))
+
+
 def test_even_images_become_numbers(folder: Path) -> None:
     """A roughness image of 128 and a metal image of 255 are factors, not maps."""
     even = np.zeros((4, 4, 3), np.uint8)
@@ -266,8 +281,9 @@ def test_index_values_out_of_range_are_one_error(folder: Path, field: str, value
 def test_names_of_maps_survive_any_file_name_and_several_sizes_take_the_largest() -> None:
     """Spaces, semicolons and equal signs in names of images come back."""
     maps = TextureMaps(
-        albedo="a b;c=d.png", metallic="x%20/y.png!2", alpha="a b;c=d.png!3", cutoff=0.2
-    )
+        albedo="a b;c=d.png", metallic="x%20/y.png!2", alpha="a b;c=d.png!3", cutoff=0.2,
+        normal="n;normal_scale=3.png", normal_scale=-0.5, occlusion_strength=0.25,
+    )  # fmt: skip
     assert find_maps(maps.name()) == maps
     assert find_maps("plain.png") is None
     assert TextureMaps(albedo="plain.png").name() == "plain.png"

@@ -67,15 +67,19 @@ def gltf_material(
         further.get("KHR_materials_specular", {}).get("specularFactor", 1.0), "specularFactor"
     )
     ior = clamp_min(1.0, further.get("KHR_materials_ior", {}).get("ior", 1.5), "ior")
+    tilts = description.get("normalTexture", {})
+    occlusion, strength = _read_occlusion(description, images)
     maps = TextureMaps(
         albedo=_image_name(pbr, "baseColorTexture", images),
         alpha=cover,
         normal=_image_name(description, "normalTexture", images),
         roughness=roughness_map,
         metallic=metallic_map,
-        occlusion=_occlusion_channel(description, images),
+        occlusion=occlusion,
         emission=glow,
         cutoff=cutoff,
+        normal_scale=clamp_min(-1e3, tilts.get("scale", 1.0), "scale of normalTexture"),
+        occlusion_strength=strength,
     )
     material = asset_types.Material(
         base_color=(red, green, blue),
@@ -244,13 +248,13 @@ def _mean_color(name: str, images: Images) -> tuple[float, float, float]:
     return (red, green, blue)
 
 
-def _occlusion_channel(description: Mapping[str, Any], images: Images) -> str:
+def _read_occlusion(description: Mapping[str, Any], images: Images) -> tuple[str, float]:
+    """Channel of the occlusion image, if it has an effect, and its strength."""
     name = _image_name(description, "occlusionTexture", images)
     strength = description.get("occlusionTexture", {}).get("strength", 1.0)
-    # Materials have no occlusion strength: the image applies fully or not at all.
-    if not name or fraction(strength, "occlusion strength") < 0.5:
-        return ""
-    return f"{name}!0" if float(images.pixels(name)[..., 0].std()) >= EVEN else ""
+    share = fraction(strength, "strength of occlusionTexture")
+    applies = name and share > 0.0 and float(images.pixels(name)[..., 0].std()) >= EVEN
+    return (f"{name}!0", share) if applies else ("", 1.0)
 
 
 def _read_factor(
