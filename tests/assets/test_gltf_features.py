@@ -256,13 +256,24 @@ def test_the_unseen_is_no_asset(builder: Builder, tmp_path: Path, material: dict
 
 
 def test_unread_content_is_named_and_unknown_ones_refused(builder: Builder, tmp_path: Path) -> None:
-    """Animations, lines and further scenes do not change the triangles at rest."""
+    """Contents that do not change the triangles at rest."""
     builder.tree["animations"] = [{"channels": [], "samplers": []}]
+    builder.tree["cameras"] = [{"type": "perspective"}]
     builder.tree["scenes"].append({"nodes": []})
+    builder.tree["extensions"] = {
+        "KHR_lights_punctual": {"lights": [{"type": "point"}] * 2},
+        "KHR_materials_variants": {"variants": [{"name": "red"}]},
+    }
+    builder.tree["extensionsUsed"] = list(builder.tree["extensions"])
+    builder.primitive["targets"] = [{"POSITION": 0}]
     builder.tree["meshes"][0]["primitives"].append({"attributes": builder.attributes, "mode": 1})
     assert builder.read(tmp_path).remarks == (
         "1 animations are not used: it is read at rest",
+        "1 cameras are not used",
+        "2 lights are not used",
+        "1 variants of materials are not used: the default ones are read",
         "1 further scenes are not read",
+        "morph targets of weight 0 are not used",
         "lines and points are not read",
     )
     builder.tree["accessors"][0]["componentType"] = 9999

@@ -1,7 +1,7 @@
 """glTF 2.0, text and binary (Khronos, "glTF 2.0 specification", 2021).
 
 Triangles are read with colours, instances, skins and morph targets at rest, and materials (see
-``gltf_materials``). Animations, cameras and lights are ignored; compressed geometry is refused.
+``gltf_materials``). Animations, cameras and lights are named; compressed geometry is refused.
 """
 
 import math
@@ -210,7 +210,10 @@ def _morph(
     positions: Float64,
     normals: Float64 | None,
 ) -> tuple[Float64, Float64 | None]:
-    for weight, target in zip(weights, primitive.get("targets", ()), strict=False):
+    targets = primitive.get("targets", ())
+    if sum(weight != 0.0 for weight in weights) < len(targets):
+        document.remarks.append("morph targets of weight 0 are not used")
+    for weight, target in zip(weights, targets, strict=False):
         if weight == 0.0 or "POSITION" not in target:
             continue
         moved = read_accessor(document, target["POSITION"], 3)
@@ -242,6 +245,8 @@ def _skin(
         for column in range(4):
             chosen = numbers[:, column].astype(np.int64)
             total += weights[:, column, None, None] * joints[chosen]
+    if "JOINTS_2" in attributes:
+        document.remarks.append("more than eight joints per vertex are not used")
     sums = total[:, 3, 3]
     if not (np.abs(sums) > 1e-6).all():
         raise ValueError("vertices of a skin without weights")
@@ -282,13 +287,16 @@ def _make_look(document: Document, description: Mapping[str, Any]) -> _Look:
         return decode_image(encoded, f"{place}#{name}", alpha=True)
 
     name = str(description.get("name", ""))
-    images = Images(lambda reference: _image_name(document, reference), cache(pixels))
+
+    def remark(text: str) -> None:
+        document.remarks.append(f"material '{name[:40]}': {text}")
+
+    images = Images(lambda reference: _image_name(document, reference), cache(pixels), remark)
     try:
         placement, described = _place_images(document, description)
-        material, unused = gltf_material(described, images)
+        material = gltf_material(described, images)
     except ValueError as error:
         raise ValueError(f"material '{name[:40]}': {error}") from None
-    document.remarks += [f"material '{name[:40]}': {text}" for text in unused]
     ends = bool(material.texture) and any(_ends(document, r) for _, r in _references(described))
     return _Look(MaterialSlot(name, material, from_file=True), placement, ends)
 

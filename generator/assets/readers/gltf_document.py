@@ -30,7 +30,7 @@ _APPLIED = frozenset(
         "KHR_texture_transform", "KHR_xmp_json_ld",
     }
 )  # fmt: skip
-"""Extensions that are applied, or do not change the look of an object."""
+"""Extensions that are applied, do not change the look of an object, or are named by content."""
 _UNPACK = "decompress it by `gltfpack -i IN -o OUT -noq`"
 _REMEDIES = {
     "EXT_meshopt_compression": _UNPACK,
@@ -104,8 +104,16 @@ def parse_document(folder: Folder, relative: str, data: bytes) -> Document:
             raise unsupported_extension(folder, relative, extension)
     unused = sorted({str(name) for name in tree.get("extensionsUsed", [])} - _APPLIED)
     remarks += [f"the extension {name} is not used" for name in unused]
-    if tree.get("animations"):
-        remarks.append(f"{len(tree['animations'])} animations are not used: it is read at rest")
+    further = tree.get("extensions", {})
+    contents = {
+        "animations are not used: it is read at rest": tree.get("animations"),
+        "cameras are not used": tree.get("cameras"),
+        "lights are not used": further.get("KHR_lights_punctual", {}).get("lights"),
+        "variants of materials are not used: the default ones are read": further.get(
+            "KHR_materials_variants", {}
+        ).get("variants"),
+    }
+    remarks += [f"{len(items)} {text}" for text, items in contents.items() if items]
     return Document(folder, relative, tree, binary, remarks=remarks)
 
 
