@@ -32,6 +32,8 @@ class TextureMaps:
         alpha: Coverage.
         roughness, metallic, occlusion: Factors.
         cutoff: Coverage in [0, 1] below which there is a hole.
+        normal_scale: Factor on the tilts of normals (their components along the surface).
+        occlusion_strength: Share in [0, 1] of the occlusion that is applied.
     """
 
     albedo: str = ""
@@ -42,6 +44,8 @@ class TextureMaps:
     occlusion: str = ""
     emission: str = ""
     cutoff: float = 0.5
+    normal_scale: float = 1.0
+    occlusion_strength: float = 1.0
 
     def name(self) -> str:
         """Name that encodes all of them; the albedo's own name if it is the only image."""
@@ -49,7 +53,12 @@ class TextureMaps:
         if not set(given) - {"albedo"}:
             return self.albedo
         parts = [f"{key}={quote(image, safe='/!.')}" for key, image in given.items()]
-        return _MARK + ";".join([*parts, f"cutoff={self.cutoff:g}"])
+        parts += [
+            f"{key}={getattr(self, key):g}"
+            for key, default in _NUMBERS.items()
+            if key == "cutoff" or getattr(self, key) != default
+        ]
+        return _MARK + ";".join(parts)
 
     def images(self) -> tuple[str, ...]:
         """Names of the images, each once, sorted."""
@@ -64,8 +73,12 @@ class TextureMaps:
         return replace(self, **changes)
 
     def _given(self) -> dict[str, str]:
-        images = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "cutoff"}
+        images = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _NUMBERS}
         return {key: image for key, image in images.items() if image}
+
+
+_NUMBERS = {f.name: f.default for f in fields(TextureMaps) if isinstance(f.default, float)}
+"""Defaults of the numeric fields."""
 
 
 def find_maps(name: str) -> TextureMaps | None:
@@ -73,8 +86,10 @@ def find_maps(name: str) -> TextureMaps | None:
     if not name.startswith(_MARK):
         return None
     parts = dict(part.partition("=")[::2] for part in name.removeprefix(_MARK).split(";"))
-    cutoff = float(parts.pop("cutoff"))
-    return TextureMaps(**{key: unquote(value) for key, value in parts.items()}, cutoff=cutoff)
+    values: dict[str, Any] = {
+        key: float(value) if key in _NUMBERS else unquote(value) for key, value in parts.items()
+    }
+    return TextureMaps(**values)
 
 
 def compose_texture(maps: TextureMaps, image: Callable[[str], UInt8]) -> TextureData:
@@ -104,16 +119,33 @@ def compose_texture(maps: TextureMaps, image: Callable[[str], UInt8]) -> Texture
     if alpha is not None:
         shifted = alpha.astype(np.int64) + 128 - int(np.ceil(maps.cutoff * 255.0))
         alpha = np.clip(shifted, 0, 255).astype(np.uint8)
+    normal, occlusion = color(maps.normal), channel(maps.occlusion)
+    if normal is not None and maps.normal_scale != 1.0:
+        normal = _scale_tilts(normal, maps.normal_scale)
+    if occlusion is not None and maps.occlusion_strength != 1.0:
+        levels = 255.0 - maps.occlusion_strength * (255.0 - np.arange(256.0))
+        occlusion = np.rint(levels).astype(np.uint8)[occlusion]
     albedo = color(maps.albedo)
     return TextureData(
         albedo=np.full((height, width, 3), 255, np.uint8) if albedo is None else albedo,
         roughness=channel(maps.roughness),
-        normal=color(maps.normal),
+        normal=normal,
         metallic=channel(maps.metallic),
-        occlusion=channel(maps.occlusion),
+        occlusion=occlusion,
         emission=color(maps.emission),
         alpha=alpha,
     )
+
+
+def _scale_tilts(normals: UInt8, scale: float) -> UInt8:
+    """Normals [height, width, 3] whose components along the surface are multiplied, normalised."""
+    scaled = np.empty_like(normals)
+    # By rows: a whole image of floating-point values could take gigabytes.
+    for row, out in zip(normals, scaled, strict=True):
+        vectors = (row / 127.5 - 1.0) * (scale, scale, 1.0)
+        lengths = np.sqrt((vectors * vectors).sum(axis=1, keepdims=True))
+        out[:] = np.rint((vectors / np.maximum(lengths, 1e-6) + 1.0) * 127.5)
+    return scaled
 
 
 def texel_indices(uvs: Float64, shape: tuple[int, ...]) -> tuple[Int64, Int64]:

@@ -67,9 +67,9 @@ class Builder:
         (folder / f"{name}.bin").write_bytes(self.data)
         (folder / f"{name}.gltf").write_text(json.dumps(self.tree))
 
-    def glb(self) -> bytes:
-        """The same as a binary glTF file."""
-        self.tree["buffers"] = [{"byteLength": len(self.data)}]
+    def glb(self, buffers: int = 1) -> bytes:
+        """The same as a binary glTF file; of several buffers, its chunk is the first."""
+        self.tree["buffers"] = [{"byteLength": len(self.data)}] * buffers
         text, data = json.dumps(self.tree).encode(), self.data + b"\0" * (-len(self.data) % 4)
         text += b" " * (-len(text) % 4)
         chunks = struct.pack("<II", len(text), 0x4E4F534A) + text

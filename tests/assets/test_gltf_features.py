@@ -175,10 +175,77 @@ def test_bytes_after_a_binary_file(builder: Builder, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "tool"),
+    [("KHR_draco_mesh_compression", "gltf-transform copy IN OUT"),
+     ("EXT_meshopt_compression", "gltfpack -i IN -o OUT -noq"),
+     ("KHR_texture_basisu", "gltf-transform ktxdecompress IN OUT")],
+)  # fmt: skip
+def test_compressed_files_are_refused_with_the_tool_that_unpacks_them(
+    builder: Builder, tmp_path: Path, name: str, tool: str
+) -> None:
+    builder.tree["extensionsRequired"] = [name]
+    with pytest.raises(AssetError, match=rf"a\.gltf: requires the unsupported {name}; .*`{tool}`"):
+        builder.read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "version"),
+    [({"asset": {"version": "1.0"}}, "1.0"), ({"asset": {}, "meshes": {"m": {}}}, "1.0"),
+     ({"asset": {"version": "2.1", "minVersion": "2.1"}}, "2.1"),
+     ({"asset": {"version": "2.1"}}, ""), ({"asset": {"version": "3.0", "minVersion": "2.0"}}, "")],
+)  # fmt: skip
+def test_other_versions_are_refused_unless_they_allow_readers_of_2_0(
+    builder: Builder, tmp_path: Path, changes: dict[str, Any], version: str
+) -> None:
+    """``minVersion`` is the oldest version whose readers may read the file."""
+    builder.tree |= changes
+    if not version:
+        assert len(builder.read(tmp_path).soup) == 1
+        return
+    with pytest.raises(AssetError, match=rf"a\.gltf: is glTF {version}, not 2\.0; "):
+        builder.read(tmp_path)
+    (tmp_path / "a.glb").write_bytes(b"glTF\x01\0\0\0" + builder.glb()[8:])
+    with pytest.raises(AssetError, match=r"is glTF 1\.0, not 2\.0; .*`gltf-pipeline -i IN -o OUT`"):
+        read_mesh(Folder(tmp_path), "a.glb")
+
+
+def test_only_the_first_buffer_is_the_binary_chunk(builder: Builder, tmp_path: Path) -> None:
+    """A second buffer without an address, as compression leaves it, has no data."""
+    (tmp_path / "a.glb").write_bytes(builder.glb(buffers=2))
+    assert len(read_mesh(Folder(tmp_path), "a.glb").soup) == 1
+    builder.tree["bufferViews"][0]["buffer"] = 1
+    (tmp_path / "a.glb").write_bytes(builder.glb(buffers=2))
+    with pytest.raises(AssetError, match="buffer 1 has no data"):
+        read_mesh(Folder(tmp_path), "a.glb")
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [{"roughnessFactor": 1.5}, {"baseColorTexture": {"index": 0}},
+     {"baseColorTexture": {"index": 1}}, {"baseColorTexture": {"index": 9}}],
+    ids=["a value", "an image that is not there", "a kind of image", "a texture"],
+)  # fmt: skip
+def test_a_material_that_no_triangle_uses_may_have_any_fault(
+    builder: Builder, tmp_path: Path, fault: dict[str, Any]
+) -> None:
+    builder.material()
+    images = [{"uri": "none.png"}, {"uri": "i.ktx2"}]
+    textures = [{"source": 0}, {"extensions": {"KHR_texture_basisu": {"source": 1}}}]
+    faulty = {"alphaMode": "BLEND", "pbrMetallicRoughness": fault}
+    builder.tree |= {"images": images, "textures": textures}
+    builder.tree["materials"].append(faulty)
+    assert builder.read(tmp_path).soup.slots[0].name == "m"
+    builder.primitive["material"] = 1
+    with pytest.raises(AssetError):
+        builder.read(tmp_path)
+
+
+@pytest.mark.parametrize(
     "material",
     [{"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0]}},
-     {"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.2]}}],
-    ids=["BLEND", "MASK"],
+     {"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.2]}},
+     {"alphaMode": "MASK", "alphaCutoff": 1.5}],
+    ids=["BLEND", "MASK", "MASK beyond 1"],
 )  # fmt: skip
 def test_the_unseen_is_no_asset(builder: Builder, tmp_path: Path, material: dict[str, Any]) -> None:
     """Alpha 0, or below the threshold of a mask."""
@@ -189,13 +256,24 @@ def test_the_unseen_is_no_asset(builder: Builder, tmp_path: Path, material: dict
 
 
 def test_unread_content_is_named_and_unknown_ones_refused(builder: Builder, tmp_path: Path) -> None:
-    """Animations, lines and further scenes do not change the triangles at rest."""
+    """Contents that do not change the triangles at rest."""
     builder.tree["animations"] = [{"channels": [], "samplers": []}]
+    builder.tree["cameras"] = [{"type": "perspective"}]
     builder.tree["scenes"].append({"nodes": []})
+    builder.tree["extensions"] = {
+        "KHR_lights_punctual": {"lights": [{"type": "point"}] * 2},
+        "KHR_materials_variants": {"variants": [{"name": "red"}]},
+    }
+    builder.tree["extensionsUsed"] = list(builder.tree["extensions"])
+    builder.primitive["targets"] = [{"POSITION": 0}]
     builder.tree["meshes"][0]["primitives"].append({"attributes": builder.attributes, "mode": 1})
     assert builder.read(tmp_path).remarks == (
         "1 animations are not used: it is read at rest",
+        "1 cameras are not used",
+        "2 lights are not used",
+        "1 variants of materials are not used: the default ones are read",
         "1 further scenes are not read",
+        "morph targets of weight 0 are not used",
         "lines and points are not read",
     )
     builder.tree["accessors"][0]["componentType"] = 9999

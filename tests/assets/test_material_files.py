@@ -156,6 +156,21 @@ def test_gltf_images_become_maps(folder: Path) -> None:
     np.testing.assert_array_equal(texture.alpha >= 128, leaf[..., 3] >= 0.25 * 255)
 
 
+def test_gltf_scales_of_normals_and_occlusion_apply(folder: Path) -> None:
+    """A normal (0.6, 0, 0.8) at scale 0.5 is (0.3, 0, 0.8) normalised; occlusion 1 + s (o - 1)."""
+    tilt = np.rint((np.array([0.6, 0.0, 0.8]) + 1.0) * 127.5)
+    normals = np.broadcast_to(tilt, (4, 4, 3)).astype(np.uint8)
+    shade = np.dstack([checker(55, 255)] * 3)
+    gltf(folder, {"normalTexture": {"index": 0, "scale": 0.5},
+                  "occlusionTexture": {"index": 1, "strength": 0.25}},
+         normals=normals, shade=shade)  # fmt: skip
+    _, texture = loaded(folder)
+    assert texture is not None and texture.normal is not None
+    found = texture.normal[0, 0] / 127.5 - 1.0
+    assert found == pytest.approx(np.array([0.3, 0.0, 0.8]) / np.hypot(0.3, 0.8), abs=0.012)
+    np.testing.assert_array_equal(texture.occlusion, checker(205, 255))
+
+
 def test_even_images_become_numbers(folder: Path) -> None:
     """A roughness image of 128 and a metal image of 255 are factors, not maps."""
     even = np.zeros((4, 4, 3), np.uint8)
@@ -177,6 +192,87 @@ def test_a_blended_image_is_opacity_and_holes(folder: Path) -> None:
     assert material.opacity == pytest.approx(0.4, abs=1e-4)
     assert texture is not None and texture.alpha is not None
     np.testing.assert_array_equal(texture.alpha >= 128, veil[..., 3] > 0)
+
+
+VARIED = np.dstack([checker(0, 255)] * 3 + [checker(60, 250)])
+
+
+def _extension(name: str, **content: Any) -> dict[str, Any]:
+    return {"extensions": {f"KHR_materials_{name}": content}}
+
+
+@pytest.mark.parametrize(
+    ("material", "remark"),
+    [({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}},
+      "the opacity of its image counts by its mean"),
+     (_extension("clearcoat", clearcoatFactor=1, clearcoatTexture={"index": 0}),
+      "clearcoatTexture counts by its mean"),
+     (_extension("clearcoat", clearcoatNormalTexture={"index": 0}),
+      "clearcoatNormalTexture is not used"),
+     (_extension("transmission", transmissionFactor=1, transmissionTexture={"index": 0}),
+      "transmissionTexture counts by its mean"),
+     (_extension("diffuse_transmission", diffuseTransmissionFactor=1,
+                 diffuseTransmissionColorTexture={"index": 0}),
+      "diffuseTransmissionColorTexture counts by its mean"),
+     (_extension("volume", thicknessFactor=1, attenuationDistance=1, attenuationColor=[1, 0, 0]),
+      "attenuationColor is not used"),
+     (_extension("pbrSpecularGlossiness", specularGlossinessTexture={"index": 0}),
+      "specularGlossinessTexture counts by its mean"),
+     (_extension("specular", specularTexture={"index": 0}), "specularTexture counts by its mean"),
+     (_extension("specular", specularColorFactor=[1, 0.5, 0.5]),
+      "the colour of its reflection (KHR_materials_specular) is not used"),
+     (_extension("ior", ior=3), "its reflectance of 25% counts as 8%")],
+)  # fmt: skip
+def test_properties_of_gltf_materials_that_are_not_used_as_they_are_have_a_remark(
+    folder: Path, material: dict[str, Any], remark: str
+) -> None:
+    pbr = {"metallicFactor": 0.0, **material.get("pbrMetallicRoughness", {})}
+    gltf(folder, {**material, "pbrMetallicRoughness": pbr}, varied=VARIED)
+    assert read_mesh(Folder(folder), "t.gltf").remarks == (f"material 'skin of it': {remark}",)
+
+
+@pytest.mark.parametrize("content", [{"ior": 3}, {"ior": 0}, {"specularColorFactor": [1, 0, 0]}])
+def test_gltf_metals_have_no_remark_on_the_reflection_of_dielectrics(
+    folder: Path, content: dict[str, Any]
+) -> None:
+    gltf(folder, _extension("ior" if "ior" in content else "specular", **content))
+    assert read_mesh(Folder(folder), "t.gltf").remarks == ()
+
+
+@pytest.mark.parametrize("ior", [0, 1000])
+@pytest.mark.parametrize(
+    ("diffuse", "reflected", "expected"),
+    [([0.5, 0.2, 0.1, 1], [0.04] * 3, ((0.5, 0.2, 0.1), 0.0, 0.5)),
+     # Black, with the reflection of gold: a metal of that colour.
+     ([0, 0, 0, 1], [1.0, 0.77, 0.34], ((1.0, 0.77, 0.34), 1.0, 1.0))],
+    ids=["plastic", "gold"],
+)  # fmt: skip
+def test_a_gltf_index_of_0_or_infinity_reflects_the_specular_colour(
+    folder: Path,
+    ior: float,
+    diffuse: list[float],
+    reflected: list[float],
+    expected: tuple[Any, ...],
+) -> None:
+    """KHR_materials_ior's mode for former specular-glossiness: F0 is specularColorFactor."""
+    extensions = {"KHR_materials_ior": {"ior": ior},
+                  "KHR_materials_specular": {"specularColorFactor": reflected}}  # fmt: skip
+    pbr = {"baseColorFactor": diffuse, "metallicFactor": 0, "roughnessFactor": 0.3}
+    gltf(folder, {"pbrMetallicRoughness": pbr, "extensions": extensions})
+    source = read_mesh(Folder(folder), "t.gltf")
+    material = source.soup.slots[0].material
+    assert material.base_color == pytest.approx(expected[0], abs=5e-3)
+    assert (material.metallic, material.roughness, source.remarks) == (expected[1], 0.3, ())
+    assert material.specular == pytest.approx(expected[2], abs=5e-3)
+
+
+@pytest.mark.parametrize(("mode", "opacity"), [("OPAQUE", 1.0), ("BLEND", 0.5)])
+def test_a_gltf_cutoff_counts_in_masks_only(folder: Path, mode: str, opacity: float) -> None:
+    """Beyond 1 it hides a mask; OPAQUE ignores alpha, too."""
+    alpha = 0.5 if mode == "BLEND" else 2.0
+    factors = {"baseColorFactor": [1, 1, 1, alpha]}
+    gltf(folder, {"alphaMode": mode, "alphaCutoff": 1.5, "pbrMetallicRoughness": factors})
+    assert loaded(folder)[0].opacity == opacity
 
 
 def test_mtl_says_opacity_light_coat_and_holes(folder: Path) -> None:
@@ -257,8 +353,9 @@ def test_index_values_out_of_range_are_one_error(folder: Path, field: str, value
 def test_names_of_maps_survive_any_file_name_and_several_sizes_take_the_largest() -> None:
     """Spaces, semicolons and equal signs in names of images come back."""
     maps = TextureMaps(
-        albedo="a b;c=d.png", metallic="x%20/y.png!2", alpha="a b;c=d.png!3", cutoff=0.2
-    )
+        albedo="a b;c=d.png", metallic="x%20/y.png!2", alpha="a b;c=d.png!3", cutoff=0.2,
+        normal="n;normal_scale=3.png", normal_scale=-0.5, occlusion_strength=0.25,
+    )  # fmt: skip
     assert find_maps(maps.name()) == maps
     assert find_maps("plain.png") is None
     assert TextureMaps(albedo="plain.png").name() == "plain.png"

@@ -1,11 +1,11 @@
 """glTF 2.0, text and binary (Khronos, "glTF 2.0 specification", 2021).
 
 Triangles are read with colours, instances, skins and morph targets at rest, and materials (see
-``gltf_materials``). Animations, cameras and lights are ignored; compressed geometry is refused.
+``gltf_materials``). Animations, cameras and lights are named; compressed geometry is refused.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -17,10 +17,10 @@ from gen_data.assets.asset_folder import Folder
 from gen_data.assets.image_decoding import decode_image
 from gen_data.assets.readers.gltf_document import (
     Document,
-    get_item,
     parse_document,
     read_accessor,
     read_uri,
+    unsupported_extension,
     view_bytes,
 )
 from gen_data.assets.readers.gltf_materials import Images, gltf_material
@@ -92,15 +92,20 @@ def read_gltf_bytes(folder: Folder, relative: str, data: bytes, materials: bool)
     """Read a glTF file from its bytes; see ``read_gltf``."""
     try:
         document = parse_document(folder, relative, data)
-        described = document.list_of("materials")
-        looks = (
-            *(_make_look(document, m) if materials else _Look(MaterialSlot()) for m in described),
-            _Look(MaterialSlot()),
-        )
+
+        @cache
+        def find_look(number: int | None) -> _Look:
+            """Look of a material that triangles have: unused ones may have any fault."""
+            if number is None or not materials:
+                return _Look(MaterialSlot())
+            return _make_look(document, document.item("materials", number, "material"))
+
         meshes = placed_meshes(document)
         if sum(len(placed.mesh["primitives"]) for placed in meshes) > MAX_PARTS:
             raise ValueError(f"more than {MAX_PARTS} primitives; join them")
-        parts = [part for placed in meshes for part in _read_primitives(document, placed, looks)]
+        parts = [
+            part for placed in meshes for part in _read_primitives(document, placed, find_look)
+        ]
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else str(error)[:120]
         raise AssetError(
@@ -115,14 +120,14 @@ def read_gltf_bytes(folder: Folder, relative: str, data: bytes, materials: bool)
 
 
 def _read_primitives(
-    document: Document, placed: PlacedMesh, looks: tuple[_Look, ...]
+    document: Document, placed: PlacedMesh, find_look: Callable[[int | None], _Look]
 ) -> list[TriangleSoup]:
     soups = []
     for primitive in placed.mesh["primitives"]:
         if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
             document.remarks.append("lines and points are not read")
             continue
-        look = get_item(looks, primitive.get("material", len(looks) - 1), "material")
+        look = find_look(primitive.get("material"))
         soup = _read_primitive(document, primitive, look, placed)
         soup = replace(soup, group_names=(placed.name,))
         soups.append(soup if placed.joints is not None else soup.transformed(placed.matrix[:3]))
@@ -205,7 +210,10 @@ def _morph(
     positions: Float64,
     normals: Float64 | None,
 ) -> tuple[Float64, Float64 | None]:
-    for weight, target in zip(weights, primitive.get("targets", ()), strict=False):
+    targets = primitive.get("targets", ())
+    if sum(weight != 0.0 for weight in weights) < len(targets):
+        document.remarks.append("morph targets of weight 0 are not used")
+    for weight, target in zip(weights, targets, strict=False):
         if weight == 0.0 or "POSITION" not in target:
             continue
         moved = read_accessor(document, target["POSITION"], 3)
@@ -237,6 +245,8 @@ def _skin(
         for column in range(4):
             chosen = numbers[:, column].astype(np.int64)
             total += weights[:, column, None, None] * joints[chosen]
+    if "JOINTS_2" in attributes:
+        document.remarks.append("more than eight joints per vertex are not used")
     sums = total[:, 3, 3]
     if not (np.abs(sums) > 1e-6).all():
         raise ValueError("vertices of a skin without weights")
@@ -277,13 +287,16 @@ def _make_look(document: Document, description: Mapping[str, Any]) -> _Look:
         return decode_image(encoded, f"{place}#{name}", alpha=True)
 
     name = str(description.get("name", ""))
-    images = Images(lambda reference: _image_name(document, reference), cache(pixels))
+
+    def remark(text: str) -> None:
+        document.remarks.append(f"material '{name[:40]}': {text}")
+
+    images = Images(lambda reference: _image_name(document, reference), cache(pixels), remark)
     try:
         placement, described = _place_images(document, description)
-        material, unused = gltf_material(described, images)
+        material = gltf_material(described, images)
     except ValueError as error:
         raise ValueError(f"material '{name[:40]}': {error}") from None
-    document.remarks += [f"material '{name[:40]}': {text}" for text in unused]
     ends = bool(material.texture) and any(_ends(document, r) for _, r in _references(described))
     return _Look(MaterialSlot(name, material, from_file=True), placement, ends)
 
@@ -350,7 +363,7 @@ def _image_name(document: Document, reference: Mapping[str, Any]) -> str:
         further = texture.get("extensions", {})
         number = further.get("EXT_texture_webp", {}).get("source")
         if number is None and further:
-            raise ValueError(f"an image of the unsupported kind {next(iter(further))}")
+            raise unsupported_extension(document.folder, document.relative, next(iter(further)))
     image = document.item("images", number, "image")
     if "uri" in image and not image["uri"].startswith("data:"):
         uri = unquote(image["uri"])

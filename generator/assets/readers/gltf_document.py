@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.readers.mesh_source import locate_file
+from gen_data.core.errors import AssetError
 
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -29,7 +30,14 @@ _APPLIED = frozenset(
         "KHR_texture_transform", "KHR_xmp_json_ld",
     }
 )  # fmt: skip
-"""Extensions that are applied, or do not change the look of an object."""
+"""Extensions that are applied, do not change the look of an object, or are named by content."""
+_UNPACK = "decompress it by `gltfpack -i IN -o OUT -noq`"
+_REMEDIES = {
+    "EXT_meshopt_compression": _UNPACK,
+    "KHR_draco_mesh_compression": "decompress it by `gltf-transform copy IN OUT`",
+    "KHR_meshopt_compression": _UNPACK,
+    "KHR_texture_basisu": "turn its images to PNG by `gltf-transform ktxdecompress IN OUT`",
+}
 
 
 @dataclass
@@ -71,10 +79,13 @@ def parse_document(folder: Folder, relative: str, data: bytes) -> Document:
     """Parse a text or binary file.
 
     Raises:
-        ValueError, KeyError, TypeError: if it is malformed or requires an unsupported extension.
+        AssetError: if it has another version or requires an unsupported extension.
+        ValueError, KeyError, TypeError: if it is malformed.
     """
     remarks: list[str] = []
     text, binary = data, b""
+    if data[:8] == b"glTF\x01\0\0\0":
+        raise _other_version(folder, relative, "1.0")
     if data[:4] == b"glTF":
         text, binary = _split_chunks(data, remarks)
     elif data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{":
@@ -82,14 +93,41 @@ def parse_document(folder: Folder, relative: str, data: bytes) -> Document:
     tree = json.loads(text.decode("utf-8-sig"))
     if not isinstance(tree, dict):
         raise ValueError("not a JSON object")
+    asset = tree.get("asset", {})
+    # Version 1.0 may leave the version out, and has objects where 2.0 has lists.
+    version = "1.0" if isinstance(tree.get("meshes"), dict) else str(asset.get("version", "2.0"))
+    least = str(asset.get("minVersion", f"{version.partition('.')[0]}.0"))
+    if least != "2.0":
+        raise _other_version(folder, relative, least)
     for extension in tree.get("extensionsRequired", []):
         if extension not in _APPLIED:
-            raise ValueError(f"it requires the unsupported {extension}")
+            raise unsupported_extension(folder, relative, extension)
     unused = sorted({str(name) for name in tree.get("extensionsUsed", [])} - _APPLIED)
     remarks += [f"the extension {name} is not used" for name in unused]
-    if tree.get("animations"):
-        remarks.append(f"{len(tree['animations'])} animations are not used: it is read at rest")
+    further = tree.get("extensions", {})
+    contents = {
+        "animations are not used: it is read at rest": tree.get("animations"),
+        "cameras are not used": tree.get("cameras"),
+        "lights are not used": further.get("KHR_lights_punctual", {}).get("lights"),
+        "variants of materials are not used: the default ones are read": further.get(
+            "KHR_materials_variants", {}
+        ).get("variants"),
+    }
+    remarks += [f"{len(items)} {text}" for text, items in contents.items() if items]
     return Document(folder, relative, tree, binary, remarks=remarks)
+
+
+def unsupported_extension(folder: Folder, relative: str, name: str) -> AssetError:
+    """The refusal of a file that cannot be read without an extension."""
+    remedy = _REMEDIES.get(name, "export it without")
+    return AssetError(f"{folder.root / relative}: requires the unsupported {name[:80]}; {remedy}")
+
+
+def _other_version(folder: Folder, relative: str, version: str) -> AssetError:
+    remedy = "export it as 2.0"
+    if version == "1.0":
+        remedy = "convert it by `gltf-pipeline -i IN -o OUT`"
+    return AssetError(f"{folder.root / relative}: is glTF {version[:20]}, not 2.0; {remedy}")
 
 
 def _split_chunks(data: bytes, remarks: list[str]) -> tuple[bytes, bytes]:
@@ -182,6 +220,8 @@ def view_bytes(document: Document, view: Mapping[str, Any]) -> bytes:
     number = view["buffer"]
     if number not in document.buffers:
         buffer = document.item("buffers", number, "buffer")
+        if "uri" not in buffer and (number or not document.binary):
+            raise ValueError(f"buffer {number} has no data")
         document.buffers[number] = (
             read_uri(document, buffer["uri"]) if "uri" in buffer else document.binary
         )

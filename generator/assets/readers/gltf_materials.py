@@ -2,9 +2,9 @@
 
 Supported are pbrMetallicRoughness, normal, occlusion and emissive textures, alpha modes, and
 KHR_materials_emissive_strength, _clearcoat, _transmission, _diffuse_transmission, _volume, _ior,
-_specular (its factor) and _pbrSpecularGlossiness.
+_specular and _pbrSpecularGlossiness.
 An extension's factor is multiplied by the mean of its image, if it has one. Uniform images become a
-number.
+number. Whatever has no equivalent is named.
 """
 
 import math
@@ -31,16 +31,16 @@ class Images:
     Attributes:
         name: Returns the name of a texture reference's image.
         pixels: Returns the pixels of an image, uint8 [height, width, 3 or 4].
+        remark: Takes a phrase on a part of the material that is not used as it is.
     """
 
     name: Callable[[Mapping[str, Any]], str]
     pixels: Callable[[str], asset_types.UInt8]
+    remark: Callable[[str], None]
 
 
-def gltf_material(
-    description: Mapping[str, Any], images: Images
-) -> tuple[asset_types.Material, tuple[str, ...]]:
-    """Convert a glTF material, and list its unused parts.
+def gltf_material(description: Mapping[str, Any], images: Images) -> asset_types.Material:
+    """Convert a glTF material.
 
     Raises:
         ValueError: if a value is out of range; the message names it.
@@ -50,49 +50,57 @@ def gltf_material(
     pbr = description.get("pbrMetallicRoughness", {})
     if glossy is not None:
         pbr = _specular_glossiness(glossy, images)
-    unused = tuple(f"{key} {_UNUSED[key]}" for key in sorted(further) if key in _UNUSED)
-    *color, alpha = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
-    passed, transmitted = _read_diffuse_transmission(further, pbr, images)
-    # Light that a thin sheet transmits is missing in its reflection.
-    red, green, blue = (fraction(c, "baseColorFactor") * (1.0 - passed) for c in color)
+    _name_unused(further, images)
+    cover, cutoff, opacity = _read_alpha(description, pbr, images)
     surface = _image_name(pbr, "metallicRoughnessTexture", images)
     roughness, roughness_map = _read_channel(pbr, "roughnessFactor", surface, 1, images)
     metallic, metallic_map = _read_channel(pbr, "metallicFactor", surface, 2, images)
-    cover, cutoff, opacity = _read_alpha(description, pbr, alpha, images)
+    clear = further.get("KHR_materials_transmission", {})
+    transmission = _read_factor(clear, "transmission", 0.0, 0, images)
+    ior, reflected = _read_reflection(further, images)
+    if metallic == 0.0 == transmission and max(reflected) > _REFLECTED_MAX:
+        kept = {_GLOSSY[key]: value for key, value in pbr.items() if key in _GLOSSY}
+        converted = _specular_glossiness({**kept, "specularFactor": reflected}, images)
+        if converted["metallicFactor"] > 0.0:
+            pbr, metallic = converted, 1.0
+    *color, _ = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
+    passed, transmitted = _read_diffuse_transmission(further, pbr, images)
+    # Light that a thin sheet transmits is missing in its reflection.
+    red, green, blue = (fraction(c, "baseColorFactor") * (1.0 - passed) for c in color)
     emission, glow = _read_emission(description, further, images)
     coat = further.get("KHR_materials_clearcoat", {})
-    clear = further.get("KHR_materials_transmission", {})
     thickness = float(further.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0))
-    shine = fraction(
-        further.get("KHR_materials_specular", {}).get("specularFactor", 1.0), "specularFactor"
-    )
-    ior = clamp_min(1.0, further.get("KHR_materials_ior", {}).get("ior", 1.5), "ior")
+    if metallic < 1.0 or metallic_map:
+        _name_reflection(reflected, transmission, images)
+    tilts = description.get("normalTexture", {})
+    occlusion, strength = _read_occlusion(description, images)
     maps = TextureMaps(
         albedo=_image_name(pbr, "baseColorTexture", images),
         alpha=cover,
         normal=_image_name(description, "normalTexture", images),
         roughness=roughness_map,
         metallic=metallic_map,
-        occlusion=_occlusion_channel(description, images),
+        occlusion=occlusion,
         emission=glow,
         cutoff=cutoff,
+        normal_scale=clamp_min(-1e3, tilts.get("scale", 1.0), "scale of normalTexture"),
+        occlusion_strength=strength,
     )
-    material = asset_types.Material(
+    return asset_types.Material(
         base_color=(red, green, blue),
         roughness=roughness,
         metallic=metallic,
-        specular=round(min(((ior - 1.0) / (ior + 1.0)) ** 2 / 0.08 * shine, 1.0), 4),
+        specular=round(min(sum(reflected) / 3.0 / _REFLECTED_MAX, 1.0), 4),
         texture=maps.name(),
         emission_cd_m2=emission,
         coat=_read_factor(coat, "clearcoat", 0.0, 0, images),
         coat_roughness=_read_factor(coat, "clearcoatRoughness", 0.0, 1, images),
-        transmission=_read_factor(clear, "transmission", 0.0, 0, images),
+        transmission=transmission,
         ior=ior,
         thin=not thickness > 0.0,
         opacity=opacity,
         diffuse_transmission=transmitted,
     )
-    return material, unused
 
 
 _UNUSED = {
@@ -103,6 +111,50 @@ _UNUSED = {
     "KHR_materials_unlit": "is not used: it is lit like other surfaces",
 }
 """Extensions of materials that have no equivalent here."""
+_REFLECTED_MAX = 0.08
+"""Largest reflectance of a dielectric at normal incidence that a material states."""
+_GLOSSY = {"baseColorFactor": "diffuseFactor", "baseColorTexture": "diffuseTexture"}
+"""Names of a dielectric's colour in KHR_materials_pbrSpecularGlossiness."""
+
+
+def _name_unused(further: Mapping[str, Any], images: Images) -> None:
+    for key in sorted(further.keys() & _UNUSED):
+        images.remark(f"{key} {_UNUSED[key]}")
+    if "clearcoatNormalTexture" in further.get("KHR_materials_clearcoat", {}):
+        images.remark("clearcoatNormalTexture is not used")
+    volume = further.get("KHR_materials_volume", {})
+    if "attenuationDistance" in volume and min(volume.get("attenuationColor", (1.0,))) < 1.0:
+        images.remark("attenuationColor is not used")
+
+
+def _read_reflection(further: Mapping[str, Any], images: Images) -> tuple[float, list[float]]:
+    """Refractive index, and a dielectric's reflectance at normal incidence, linear RGB.
+
+    Source: KHR_materials_ior, where 0 stands for infinity, and KHR_materials_specular.
+    """
+    ior, whole = further.get("KHR_materials_ior", {}).get("ior", 1.5), 1.0
+    if ior == 0:
+        ior = 1.5
+    else:
+        ior = clamp_min(1.0, ior, "ior")
+        whole = ((ior - 1.0) / (ior + 1.0)) ** 2
+    specular = further.get("KHR_materials_specular", {})
+    strength = fraction(specular.get("specularFactor", 1.0), "specularFactor")
+    strength *= _read_mean(specular, "specularTexture", 3, images)
+    tint = _read_mean_color(specular, "specularColorTexture", images)
+    colors = specular.get("specularColorFactor", (1.0, 1.0, 1.0))
+    return ior, [
+        min(whole * clamp_min(0.0, c, "specularColorFactor") * t, 1.0) * strength
+        for c, t in zip(colors, tint, strict=True)
+    ]
+
+
+def _name_reflection(reflected: Sequence[float], transmission: float, images: Images) -> None:
+    """Name properties that ``Material.specular`` lacks; glass reflects by its ``ior``."""
+    if max(reflected) - min(reflected) > 0.01 * max(reflected):
+        images.remark("the colour of its reflection (KHR_materials_specular) is not used")
+    if transmission == 0.0 and max(reflected) > 1.01 * _REFLECTED_MAX:
+        images.remark(f"its reflectance of {max(reflected):.0%} counts as {_REFLECTED_MAX:.0%}")
 
 
 def _specular_glossiness(glossy: Mapping[str, Any], images: Images) -> dict[str, Any]:
@@ -114,12 +166,9 @@ def _specular_glossiness(glossy: Mapping[str, Any], images: Images) -> dict[str,
     diffuse = [float(c) for c in glossy.get("diffuseFactor", (1.0, 1.0, 1.0, 1.0))]
     specular = [fraction(c, "specularFactor") for c in glossy.get("specularFactor", (1.0,) * 3)]
     gloss = fraction(glossy.get("glossinessFactor", 1.0), "glossinessFactor")
-    image = _image_name(glossy, "specularGlossinessTexture", images)
-    if image:
-        pixels = images.pixels(image)
-        mean = _mean_color(image, images)
-        specular = [a * b for a, b in zip(specular, mean, strict=True)]
-        gloss *= float(pixels[..., 3].mean()) / 255.0 if pixels.shape[2] == 4 else 1.0
+    mean = _read_mean_color(glossy, "specularGlossinessTexture", images)
+    specular = [a * b for a, b in zip(specular, mean, strict=True)]
+    gloss *= _read_mean(glossy, "specularGlossinessTexture", 3, images)
     base = _mean_color(_image_name(glossy, "diffuseTexture", images), images)
     whole = [a * b for a, b in zip(diffuse[:3], base, strict=True)]
     metallic = _solve_metallic(_brightness(whole), _brightness(specular), 1.0 - max(specular))
@@ -166,28 +215,31 @@ def _read_channel(
 
 
 def _read_alpha(
-    description: Mapping[str, Any], pbr: Mapping[str, Any], factor: float, images: Images
+    description: Mapping[str, Any], pbr: Mapping[str, Any], images: Images
 ) -> tuple[str, float, float]:
     """Coverage channel, its cutoff, and opacity.
 
     A blended image gets its mean coverage outside its holes as opacity; uncovered texels are holes.
     """
     mode = description.get("alphaMode", "OPAQUE")
+    if mode not in ("BLEND", "MASK"):
+        return "", 0.5, 1.0
     name = _image_name(pbr, "baseColorTexture", images)
-    factor = fraction(factor, "baseColorFactor's alpha")
-    cutoff = fraction(description.get("alphaCutoff", 0.5), "alphaCutoff")
-    cover = images.pixels(name) if name and mode != "OPAQUE" else None
+    factor = fraction(pbr.get("baseColorFactor", (1.0,) * 4)[3], "baseColorFactor's alpha")
+    cover = images.pixels(name) if name else None
     seen = cover is not None and cover.shape[2] == 4
     if mode == "MASK":
+        # Beyond 1, nothing is seen.
+        cutoff = clamp_min(0.0, description.get("alphaCutoff", 0.5), "alphaCutoff")
         # The threshold applies to image times factor; here the image alone is compared.
         needed = min(cutoff / max(factor, 1e-6), 1.0)
         return (f"{name}!3" if seen else "", needed, 1.0 if factor >= cutoff else 0.0)
-    if mode != "BLEND":
-        return "", 0.5, 1.0
     if cover is None or not seen:
         return "", 0.5, round(factor, 4)
     covered = cover[..., 3][cover[..., 3] >= _MIN_COVERAGE]
     mean = float(covered.mean()) / 255.0 if covered.size else 0.0
+    if covered.size and float(covered.std()) >= EVEN:
+        images.remark("the opacity of its image counts by its mean")
     holes = bool(covered.size < cover[..., 3].size)
     return (f"{name}!3" if holes else "", _MIN_COVERAGE / 255.0, round(factor * mean, 4))
 
@@ -213,14 +265,11 @@ def _read_diffuse_transmission(
     albedo is scaled such that its mean is the file's.
     """
     extension = further.get("KHR_materials_diffuse_transmission", {})
-    share = fraction(extension.get("diffuseTransmissionFactor", 0.0), "diffuseTransmissionFactor")
-    name = _image_name(extension, "diffuseTransmissionTexture", images)
-    if name and images.pixels(name).shape[2] == 4:
-        share *= float(np.mean(images.pixels(name)[..., 3])) / 255.0
+    share = _read_factor(extension, "diffuseTransmission", 0.0, 3, images)
     if share == 0.0:
         return 0.0, (0.0, 0.0, 0.0)
     factors = extension.get("diffuseTransmissionColorFactor", (1.0, 1.0, 1.0))
-    own = _mean_color(_image_name(extension, "diffuseTransmissionColorTexture", images), images)
+    own = _read_mean_color(extension, "diffuseTransmissionColorTexture", images)
     base = _mean_color(_image_name(pbr, "baseColorTexture", images), images)
     red, green, blue = (
         round(min(share * fraction(c, "diffuseTransmissionColorFactor") * part / whole, 1.0), 4)
@@ -243,23 +292,43 @@ def _mean_color(name: str, images: Images) -> tuple[float, float, float]:
     return (red, green, blue)
 
 
-def _occlusion_channel(description: Mapping[str, Any], images: Images) -> str:
+def _read_occlusion(description: Mapping[str, Any], images: Images) -> tuple[str, float]:
+    """Channel of the occlusion image, if it has an effect, and its strength."""
     name = _image_name(description, "occlusionTexture", images)
     strength = description.get("occlusionTexture", {}).get("strength", 1.0)
-    # Materials have no occlusion strength: the image applies fully or not at all.
-    if not name or fraction(strength, "occlusion strength") < 0.5:
-        return ""
-    return f"{name}!0" if float(images.pixels(name)[..., 0].std()) >= EVEN else ""
+    share = fraction(strength, "strength of occlusionTexture")
+    applies = name and share > 0.0 and float(images.pixels(name)[..., 0].std()) >= EVEN
+    return (f"{name}!0", share) if applies else ("", 1.0)
 
 
 def _read_factor(
     extension: Mapping[str, Any], key: str, default: float, channel: int, images: Images
 ) -> float:
     value = fraction(extension.get(f"{key}Factor", default), f"{key}Factor")
-    name = _image_name(extension, f"{key}Texture", images)
-    if name:
-        value *= float(np.mean(images.pixels(name)[..., channel])) / 255.0
-    return round(value, 4)
+    return (
+        round(value * _read_mean(extension, f"{key}Texture", channel, images), 4) if value else 0.0
+    )
+
+
+def _read_mean(holder: Mapping[str, Any], key: str, channel: int, images: Images) -> float:
+    """Mean of an image's channel in [0, 1]; 1 = none. A channel that varies is named."""
+    name = _image_name(holder, key, images)
+    if not name or channel >= images.pixels(name).shape[2]:
+        return 1.0
+    values = images.pixels(name)[..., channel]
+    if float(values.std()) >= EVEN:
+        images.remark(f"{key} counts by its mean")
+    return float(np.mean(values)) / 255.0
+
+
+def _read_mean_color(
+    holder: Mapping[str, Any], key: str, images: Images
+) -> tuple[float, float, float]:
+    """Mean linear colour of an image; white = none. An image that varies is named."""
+    name = _image_name(holder, key, images)
+    if name and float(images.pixels(name)[..., :3].std(axis=(0, 1)).max()) >= EVEN:
+        images.remark(f"{key} counts by its mean")
+    return _mean_color(name, images)
 
 
 def _image_name(holder: Mapping[str, Any], key: str, images: Images) -> str:
