@@ -5,6 +5,8 @@ import math
 import re
 import tempfile
 import warnings
+from collections.abc import Mapping
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,21 @@ from gen_data.core.errors import AssetError
 
 DECODER_VERSION = 2
 """Increased whenever the same file is decoded to other pixels."""
+PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+"""Suffixes of photographs, in lower case; cameras and telephones also write upper case."""
+_REMEDIES = {
+    "save them as JPEG or PNG": (".heic", ".heif", ".hif", ".avif", ".jxl", ".jp2", ".gif"),
+    "develop them to JPEG or TIFF": (
+        ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw", ".raw",
+    ),
+    "save their frames as PNG": (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".3gp"),
+}  # fmt: skip
+UNREAD: Mapping[str, str] = {
+    suffix: f"{suffix[1:].upper()} files are not read: {remedy}"
+    for remedy, suffixes in _REMEDIES.items()
+    for suffix in suffixes
+}
+"""Remedy for pictures and films of users by suffix, in lower case."""
 MAX_SIDE_PX = 16_384
 MAX_PIXELS = 64_000_000
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
@@ -22,6 +39,11 @@ _EXR_MAGIC = b"\x76\x2f\x31\x01"
 _MAX_RINGING = 1e-4
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
 _WITH_ALPHA = ("RGBA", "LA", "PA")
+
+
+def why_unread(path: PurePath) -> str:
+    """Why a picture or film is not read, with the remedy; empty for other files."""
+    return UNREAD.get(path.suffix.lower(), "")
 
 
 def decode_image(data: bytes, place: str, *, alpha: bool = False) -> asset_types.UInt8:

@@ -24,7 +24,6 @@ from gen_data.lab.matching.recordings import ImageLabels, Photo, Scan
 
 T = TypeVar("T")
 
-PHOTO_ENDINGS = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 SCAN_ENDINGS = frozenset({".bin", ".pcd", ".ply", ".npy"})
 NO_PHOTOS = frozenset(channel.value for channel in Channel if channel is not Channel.RGB)
 """Names of folders that hold label images."""
@@ -61,13 +60,14 @@ class Inventory:
 
 @dataclass(frozen=True)
 class RealFiles:
-    """The files of a folder by kind, sorted by path."""
+    """The files of a folder by kind, sorted by path; ``unread`` are pictures in other formats."""
 
     folder: Path
     photos: tuple[Path, ...]
     scans: tuple[Path, ...]
     coco: tuple[Path, ...]
     kitti: tuple[Path, ...]
+    unread: tuple[Path, ...] = ()
 
 
 def find_files(folder: Path) -> RealFiles:
@@ -81,7 +81,7 @@ def find_files(folder: Path) -> RealFiles:
             f"{folder}: is not a folder; expected one with photographs or laser scans"
         )
     seen: set[tuple[int, int]] = set()
-    photos, scans, coco, kitti = [], [], [], []
+    photos, scans, coco, kitti, unread = [], [], [], [], []
     for path in files_below(folder):
         inner = path.relative_to(folder).parts
         if any(part.startswith(".") for part in inner):
@@ -91,7 +91,7 @@ def find_files(folder: Path) -> RealFiles:
         if status.st_ino and (status.st_dev, status.st_ino) in seen:
             continue
         seen.add((status.st_dev, status.st_ino))
-        if ending in PHOTO_ENDINGS and not NO_PHOTOS.intersection(parents):
+        if ending in image_decoding.PHOTO_SUFFIXES and not NO_PHOTOS.intersection(parents):
             photos.append(path)
         elif ending in SCAN_ENDINGS:
             scans.append(path)
@@ -99,13 +99,17 @@ def find_files(folder: Path) -> RealFiles:
             coco.append(path)
         elif ending == ".txt" and parents[-1:] == ("label_2",):
             kitti.append(path)
+        elif ending in image_decoding.UNREAD:
+            unread.append(path)
     if not photos and not scans:
+        counts = Counter(map(image_decoding.why_unread, unread))
+        others = "".join(f"; {count} {why}" for why, count in counts.items())
         raise StorageError(
-            f"{folder}: holds no photographs ({', '.join(sorted(PHOTO_ENDINGS))}) and no laser"
-            f" scans ({', '.join(sorted(SCAN_ENDINGS))})"
+            f"{folder}: holds no photographs ({', '.join(sorted(image_decoding.PHOTO_SUFFIXES))})"
+            f" and no laser scans ({', '.join(sorted(SCAN_ENDINGS))}){others}"
         )
-    instances = [path for path in coco if path.stem.startswith("instances")]
-    return RealFiles(folder, tuple(photos), tuple(scans), tuple(instances or coco), tuple(kitti))
+    coco = [path for path in coco if path.stem.startswith("instances")] or coco
+    return RealFiles(folder, *map(tuple, (photos, scans, coco, kitti, unread)))
 
 
 def files_below(folder: Path) -> list[Path]:
@@ -141,7 +145,10 @@ def choose_evenly(files: Sequence[T], limit: int) -> list[T]:
 
 def read_photos(files: RealFiles, limit: int, inventory: Inventory) -> Iterator[Photo]:
     """Read photographs one after the other; unusable ones are counted."""
-    inventory.found["photographs"] = len(files.photos)
+    inventory.found["photographs"] = len(files.photos) + len(files.unread)
+    for path in files.unread:
+        why = image_decoding.why_unread(path)
+        inventory.skip("photographs", why, path.relative_to(files.folder))
     sizes: Counter[tuple[int, int]] = Counter()
     for path in choose_evenly(files.photos, limit):
         name = str(path.relative_to(files.folder))
