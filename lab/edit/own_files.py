@@ -154,7 +154,7 @@ def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked
         AssetError: it cannot be used; the text states why.
     """
     data = (folder / name).read_bytes()
-    rgb = decode_image(data, name)
+    rgb = decode_image(data, name, color=True)
     size_px = rgb.shape[1], rgb.shape[0]
 
     def locate(one: Standpoint) -> Plate:

@@ -13,7 +13,7 @@ from gen_data.core.asset_types import UInt8
 from gen_data.core.errors import AssetError, ConfigError, StorageError, list_names
 from gen_data.lab.matching import label_files
 from gen_data.lab.matching.label_files import RealObject
-from gen_data.lab.matching.real_files import choose_evenly, files_below, read_rgb
+from gen_data.lab.matching.real_files import choose_evenly, files_below, read_picture
 
 _UNSTATED = (0, 0)
 _IMAGES = re.compile(rb'"(images|annotations)"\s*:\s*\[\s*[{\]]')
@@ -178,7 +178,7 @@ def check_judges(real: RealSet) -> None:
 def read_image(path: Path) -> UInt8:
     """RGB image [h, w, 3]. Raises StorageError if it cannot be read."""
     try:
-        return read_rgb(path)
+        return read_picture(path)[0]
     except AssetError as error:
         raise StorageError(str(error)) from error
 
@@ -486,13 +486,15 @@ def _readable(
             skipped[f"image: {why}"] += 1
             continue
         try:
-            height, width = read_image(frame.path).shape[:2]
-        except StorageError:
+            pixels, remarks = read_picture(frame.path)
+        except AssetError:
             skipped["image that cannot be read"] += 1
             continue
+        height, width = pixels.shape[:2]
         if frame.stated_px not in (_UNSTATED, (width, height)):
             skipped["image of another size than its labels state"] += 1
             continue
+        skipped.update(f"part of an image that is read: {text}" for text in remarks)
         objects = _scaled(frame.objects, width, height) if frame.is_relative else frame.objects
         if empty := sum(not _has_area(thing) for thing in objects):
             skipped["object with an empty box"] += empty
