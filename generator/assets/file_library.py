@@ -26,6 +26,7 @@ from gen_data.assets.folder_index import (
     PlateEntry,
     RobotEntry,
     TextureEntry,
+    entry_maps,
     list_assets,
     read_index,
     user_folder,
@@ -170,7 +171,12 @@ class FileLibrary:
         if len(known) < len(found):
             return None
         described = () if part else self._described_remarks(one)
-        own = (importer.FileRemarks(one.entry.file, described),) if described else ()
+        own = [importer.FileRemarks(one.entry.file, described)] if described else []
+        own += [
+            importer.FileRemarks(file, (text,))
+            for maps in entry_maps(one.entry)
+            for file, text in maps.remarks().items()
+        ]
         return tuple(
             replace(remarks, file=str(one.root / remarks.file))
             for remarks in dict.fromkeys((*own, *chain(*known)))
