@@ -71,22 +71,23 @@ def _inspect(one: IndexedAsset, library: Library) -> Finding:
     """Import an asset. Raises AssetError if it cannot be used."""
     origin = () if one.origin.licence not in ("", "unknown") else (NO_LICENCE,)
     if one.kind == "plate":
-        return _inspect_plate(one, library, origin)
+        return _inspect_plate(one, library, (*_list_remarks(one, library), *origin))
     if one.kind in ("texture", "environment"):
         (library.texture if one.kind == "texture" else library.environment)(one.asset_id)
-        return Finding(one.asset_id, one.kind, "", warnings=origin)
+        doubts = (*_list_remarks(one, library), *origin)
+        return Finding(one.asset_id, one.kind, "", warnings=doubts)
     measure = _measure_robot if one.kind == "robot" else _measure_object
     triangles, low, high = measure(one, library)
     size_m = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
     _open_images(one, library)
-    seen = (
-        f"{remarks.file}: {text}"
-        for remarks in library.remarks(one.asset_id) or ()
-        for text in remarks.unused
-    )
-    warnings = (*_find_doubts(one, max(size_m)), *seen, *origin)
+    warnings = (*_find_doubts(one, max(size_m)), *_list_remarks(one, library), *origin)
     found = (triangles, size_m, _describe_unit(one), _describe_up(one))
     return Finding(one.asset_id, one.kind, one.category(), *found, warnings=warnings)
+
+
+def _list_remarks(one: IndexedAsset, library: Library) -> Iterator[str]:
+    for remarks in library.remarks(one.asset_id) or ():
+        yield from (f"{remarks.file}: {text}" for text in remarks.unused)
 
 
 def _open_images(one: IndexedAsset, library: Library) -> None:

@@ -26,6 +26,7 @@ from gen_data.assets.folder_index import (
     PlateEntry,
     RobotEntry,
     TextureEntry,
+    entry_maps,
     list_assets,
     read_index,
     user_folder,
@@ -54,7 +55,7 @@ PYBULLET = "pybullet"
 """Name of the pack with those files of pybullet that its index describes."""
 _PYBULLET = Path(__file__).with_name("pybullet.yaml")
 _RENDERED = Path(str(content().__file__)).parent / "plates"
-PLATES_VERSION = 2
+PLATES_VERSION = 3
 """Changes with the measurements in photographs."""
 
 
@@ -161,22 +162,40 @@ class FileLibrary:
         """
         part = self._part(asset_id)
         one = part[0] if part else self._entries()[asset_id]
-        if part:
-            names = [part[1]]
-        elif one.kind == "robot":
+        names = [part[1] if part else ""]
+        if one.kind == "robot" and not part:
             names = list(self._robot(one).links)
-        else:
-            names = [""] if one.kind == "object" else []
-        found = [self._remarks_of(one, name, read) for name in names]
+        of_part = self._remarks_of if one.kind in ("object", "robot") else self._image_remarks
+        found = [of_part(one, name, read) for name in names]
         known = [remarks for remarks in found if remarks is not None]
         if len(known) < len(found):
             return None
-        has_links = not part and one.kind in ("object", "robot")
-        described = self._described_remarks(one) if has_links else ()
-        own = (importer.FileRemarks(one.entry.file, described),) if described else ()
+        described = () if part else self._described_remarks(one)
+        own = [importer.FileRemarks(one.entry.file, described)] if described else []
+        own += [
+            importer.FileRemarks(file, (text,))
+            for maps in entry_maps(one.entry)
+            for file, text in maps.remarks().items()
+        ]
         return tuple(
             replace(remarks, file=str(one.root / remarks.file))
             for remarks in dict.fromkeys((*own, *chain(*known)))
+        )
+
+    def _image_remarks(
+        self, one: IndexedAsset, _: str, read: bool
+    ) -> tuple[importer.FileRemarks, ...] | None:
+        """Remarks on the colours of a texture, a sky or a photograph; see ``remarks``."""
+        entry, decoder = one.entry, image_decoding.DECODER_VERSION
+        key = content_key({"asset": self._key(one), "part": "remarks", "decoder": decoder})
+        if not read and self._disk.find(key) is None:
+            return None
+        images = _images_of(entry.texture_name() if isinstance(entry, TextureEntry) else entry.file)
+        colors = tuple(name for name, channels in images.items() if channels != "stored")
+        return self._store.get(
+            key,
+            lambda: self._parse(one, parsing.parse_image_remarks, colors),
+            lambda arrays: parsing.unpack_value(tuple[importer.FileRemarks, ...], arrays),
         )
 
     def _remarks_of(
@@ -268,12 +287,12 @@ class FileLibrary:
             if not isinstance(one.entry, TextureEntry):
                 raise AssetError(f"asset '{owner}': is of kind {one.kind}, not a texture")
             name = one.entry.texture_name()
-        maps = find_maps(name)
+        maps, images = find_maps(name), _images_of(name)
         if maps is not None:
             return compose_texture(
-                maps, lambda image: self._image(owner, one, folder, image, "rgba")
+                maps, lambda image: self._image(owner, one, folder, image, images[image])
             )
-        pixels = self._image(owner, one, folder, name, "rgb")
+        pixels = self._image(owner, one, folder, name, images[name])
         return TextureData(np.ascontiguousarray(pixels[..., :3]))
 
     def _image(
@@ -283,6 +302,8 @@ class FileLibrary:
         has_mesh = one.kind == "object" or owner != one.asset_id
         if has_mesh and name in (images := self.imported(owner).images):
             return images[name]
+        if has_mesh and one.entry.file.endswith(".gltf") and name not in one.entry.files():
+            channels = "stored"
         pixels: UInt8 = self._decode_cached(folder, name, channels)
         return pixels
 
@@ -317,9 +338,8 @@ class FileLibrary:
             "format": FORMAT,
             "decoder": image_decoding.DECODER_VERSION,
             "image": digests[name],
+            "channels": channels,
         }
-        if channels == "rgba":
-            key["channels"] = channels
         return self._store.get(
             content_key(key),
             lambda: run_sandboxed(parsing.parse_image, folder.root, digests, name, channels),
@@ -428,6 +448,15 @@ class FileLibrary:
                 for name, digest in self._digests.of(folder, file).items()
             }
         return self._hashed[one.asset_id]
+
+
+def _images_of(name: str) -> dict[str, str]:
+    """How to decode each image of a texture: see ``channels`` of ``parsing.parse_image``."""
+    maps = find_maps(name)
+    if maps is None:
+        return {name: "rgb"}
+    colors = (maps.albedo, maps.emission)
+    return {image: "rgba" if image in colors else "stored" for image in maps.images()}
 
 
 def describe_unused(unused: tuple[tuple[str, int], ...]) -> str:

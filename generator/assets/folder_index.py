@@ -63,9 +63,11 @@ class TextureMaps(Strict):
     Attributes:
         color: sRGB.
         alpha: Grey; values below one half are holes.
-        normal: Tangent space, +Y up (OpenGL).
+        normal: Tangent space, +Y up (OpenGL); green is inverted of files that are for DirectX by
+            their names (``rock_nor_dx_2k.png``, ``Rock_NormalDX.jpg``).
         orm: Occlusion in red, roughness in green, metallic in blue, as glTF packs them.
-        roughness, metallic, occlusion: Grey images, instead of ``orm``.
+        roughness, metallic, occlusion: Grey images, instead of ``orm``; a roughness that is gloss
+            by its name (``rock_gloss.png``) is inverted.
         emission: sRGB.
     """
 
@@ -93,15 +95,30 @@ class TextureMaps(Strict):
     def name(self) -> str:
         """Name of the combined texture; see ``texture_maps``."""
         orm = self.orm
+        roughness = self.roughness + ("!0-" if _GLOSS.search(self.roughness) else "")
         return Maps(
             albedo=self.color,
             alpha=self.alpha,
-            normal=self.normal,
+            normal=self.normal + ("!1-" if _DIRECTX.search(self.normal) else ""),
             occlusion=f"{orm}!0" if orm else self.occlusion,
-            roughness=f"{orm}!1" if orm else self.roughness,
+            roughness=f"{orm}!1" if orm else roughness,
             metallic=f"{orm}!2" if orm else self.metallic,
             emission=self.emission,
         ).name()
+
+    def remarks(self) -> dict[str, str]:
+        """Images that are inverted because of their names, with the reason."""
+        found = {}
+        if _DIRECTX.search(self.normal):
+            found[self.normal] = "for DirectX by its name; its green is inverted"
+        if _GLOSS.search(self.roughness):
+            found[self.roughness] = "gloss by its name; inverted to roughness"
+        return found
+
+
+_DIRECTX = re.compile(r"(?i)no?rm?(?:als?)?[-_. ]?(?:dx|directx)(?![a-z])[^/]*$")
+"""Poly Haven's ``_nor_dx``, ambientCG's ``_NormalDX`` and their like."""
+_GLOSS = re.compile(r"(?i)(?:^|/)(?![^/]*rough)[^/]*(?<![a-z])gloss(?:iness)?(?![a-z])[^/]*$")
 
 
 class Finish(Strict):
@@ -657,6 +674,19 @@ def _described_files(root: Path, description: str) -> tuple[str, ...]:
     except AssetError:
         # It is listed nevertheless; its import reports the fault.
         return ()
+
+
+def entry_maps(entry: Entry) -> tuple[TextureMaps, ...]:
+    """All maps of an entry."""
+    if isinstance(entry, TextureEntry):
+        found = [entry.maps]
+    elif isinstance(entry, MeshEntry | RobotEntry):
+        regions = entry.regions if isinstance(entry, MeshEntry) else ()
+        finishes = (*entry.materials.values(), *(region.finish for region in regions))
+        found = [finish.maps for finish in finishes]
+    else:
+        found = []
+    return tuple(maps for maps in found if maps is not None)
 
 
 def _unique_files(*parts: str | TextureMaps | None) -> tuple[str, ...]:

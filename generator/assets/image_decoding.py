@@ -1,20 +1,39 @@
 """Decoding of image files; size limits are checked before decoding."""
 
+import contextlib
 import io
 import math
 import re
 import tempfile
 import warnings
+from collections.abc import Mapping
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.assets import color_profiles
 from gen_data.core import asset_types, colorimetry, optional_packages
 from gen_data.core.errors import AssetError
 
-DECODER_VERSION = 2
+DECODER_VERSION = 3
 """Increased whenever the same file is decoded to other pixels."""
+PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+"""Suffixes of photographs, in lower case; cameras and telephones also write upper case."""
+_REMEDIES = {
+    "save them as JPEG or PNG": (".heic", ".heif", ".hif", ".avif", ".jxl", ".jp2", ".gif"),
+    "develop them to JPEG or TIFF": (
+        ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw", ".raw",
+    ),
+    "save their frames as PNG": (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".3gp"),
+}  # fmt: skip
+UNREAD: Mapping[str, str] = {
+    suffix: f"{suffix[1:].upper()} files are not read: {remedy}"
+    for remedy, suffixes in _REMEDIES.items()
+    for suffix in suffixes
+}
+"""Remedy for pictures and films of users by suffix, in lower case."""
 MAX_SIDE_PX = 16_384
 MAX_PIXELS = 64_000_000
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
@@ -24,8 +43,15 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
 _WITH_ALPHA = ("RGBA", "LA", "PA")
 
 
-def decode_image(data: bytes, place: str, *, alpha: bool = False) -> asset_types.UInt8:
-    """Decode an image to sRGB, uint8 [height, width, 3], upright by its EXIF orientation.
+def why_unread(path: PurePath) -> str:
+    """Why a picture or film is not read, with the remedy; empty for other files."""
+    return UNREAD.get(path.suffix.lower(), "")
+
+
+def decode_image(
+    data: bytes, place: str, *, alpha: bool = False, color: bool = False
+) -> asset_types.UInt8:
+    """Decode an image to uint8 [height, width, 3], upright by its EXIF orientation.
 
     Sixteen bits per channel become eight; floating-point values count to 1.
 
@@ -33,6 +59,8 @@ def decode_image(data: bytes, place: str, *, alpha: bool = False) -> asset_types
         data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA.
         place: Name of the image in error messages.
         alpha: Keep transparency as a fourth channel, if any pixel is transparent.
+        color: Convert colours to sRGB by an embedded profile. Else values stay as stored: they are
+            data, or of glTF, whose readers must ignore profiles (glTF 2.0, "Images").
 
     Raises:
         AssetError: if it is unreadable, or larger than 16,384 pixels a side or 64 megapixels.
@@ -48,10 +76,12 @@ def decode_image(data: bytes, place: str, *, alpha: bool = False) -> asset_types
                     ImageOps.exif_transpose(image, in_place=True)
                 if image.mode in _DEEP:
                     return _to_eight_bits(np.asarray(image), image.mode)
+                converted = color_profiles.to_srgb(image) if color else image.convert("RGB")
+                rgb = np.array(converted, dtype=np.uint8)
                 if alpha and (image.mode in _WITH_ALPHA or "transparency" in image.info):
-                    pixels = np.array(image.convert("RGBA"), dtype=np.uint8)
-                    return pixels if pixels[..., 3].min() < 255 else pixels[..., :3].copy()
-                return np.array(image.convert("RGB"), dtype=np.uint8)
+                    coverage = np.asarray(image.convert("RGBA"))[..., 3:]
+                    return rgb if coverage.min() == 255 else np.concatenate([rgb, coverage], axis=2)
+                return rgb
     except Image.DecompressionBombError:
         raise AssetError(
             f"{place}: more than {MAX_PIXELS // 1_000_000} megapixels; scale it down"
@@ -65,6 +95,17 @@ def decode_image(data: bytes, place: str, *, alpha: bool = False) -> asset_types
         raise AssetError(
             f"{place}: unreadable image ({type(error).__name__}); save it again as PNG or JPEG"
         ) from None
+
+
+def image_remarks(data: bytes) -> tuple[str, ...]:
+    """Unused contents of an encoded image, one phrase each; empty if it is unreadable."""
+    from PIL import Image
+
+    with warnings.catch_warnings(), contextlib.suppress(Exception):
+        warnings.simplefilter("ignore")
+        with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+            return color_profiles.color_remarks(image)
+    return ()
 
 
 _ORIENTATION = 0x0112

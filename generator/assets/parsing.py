@@ -15,7 +15,7 @@ from gen_data.assets.asset_arrays import encode_text, pack_imported
 from gen_data.assets.asset_cache import Arrays
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.folder_index import MeshEntry, PlateEntry, RobotEntry
-from gen_data.assets.image_decoding import decode_image, decode_radiance
+from gen_data.assets.image_decoding import decode_image, decode_radiance, image_remarks
 from gen_data.assets.robot_models import describe_robot
 from gen_data.core import errors, plates, serialization
 from gen_data.usd.stage_reader import layer_references
@@ -79,15 +79,25 @@ def parse_stage(root: Path, digests: Digests, entry: MeshEntry, asset_id: str) -
 
 
 def parse_image(root: Path, digests: Digests, name: str, channels: str) -> Arrays:
-    """Decode an image to ``{channels: pixels}``; ``channels`` is rgb, rgba or radiance."""
+    """Decode an image to ``{channels: pixels}``.
+
+    ``channels`` is rgb or rgba for colours as sRGB, stored for values as they are, or radiance.
+    """
     folder = Folder(root)
     data, place = folder.read(name), str(root / name)
     pixels: Any = (
         decode_radiance(data, place)
         if channels == "radiance"
-        else decode_image(data, place, alpha=channels == "rgba")
+        else decode_image(data, place, alpha=channels != "rgb", color=channels != "stored")
     )
     return _checked(folder, digests, {channels: pixels})
+
+
+def parse_image_remarks(root: Path, digests: Digests, names: tuple[str, ...]) -> Arrays:
+    """List the unused contents of images, for ``unpack_value``."""
+    folder = Folder(root)
+    found = [importer.FileRemarks(name, image_remarks(folder.read(name))) for name in names]
+    return _checked(folder, digests, _pack_value([one for one in found if one.unused]))
 
 
 def parse_plate(root: Path, digests: Digests, entry: PlateEntry) -> Arrays:
@@ -103,7 +113,7 @@ def parse_surroundings(root: Path, digests: Digests, file: str, plate: plates.Pl
     from gen_data.assets.plates.surroundings import surroundings
 
     folder = Folder(root)
-    rgb = decode_image(folder.read(file), str(root / file))
+    rgb = decode_image(folder.read(file), str(root / file), color=True)
     return _checked(folder, digests, {"radiance": surroundings(plate, rgb)[1]})
 
 

@@ -25,7 +25,8 @@ _WEIGHTS = _INSIDE / _INSIDE.sum(axis=1, keepdims=True)
 class TextureMaps:
     """Image names of one material, as readers give them; empty = none.
 
-    All but ``albedo``, ``normal`` and ``emission`` use one channel: ``wood.png!1`` is green.
+    All but ``albedo``, ``normal`` and ``emission`` use one channel: ``wood.png!1`` is green. A
+    channel is inverted by a minus behind its number, also in ``normal``: ``wood.png!1-``.
 
     Attributes:
         albedo, normal, emission: RGB images; albedo and emission in sRGB.
@@ -104,16 +105,22 @@ def compose_texture(maps: TextureMaps, image: Callable[[str], UInt8]) -> Texture
     height, width = max((p.shape[:2] for p in pixels.values()), key=lambda s: s[0] * s[1])
 
     def color(name: str) -> UInt8 | None:
-        return _resize(pixels[name][..., :3], width, height) if name else None
+        if not name:
+            return None
+        file, _, inverted = name.partition("!")
+        rgb = pixels[file][..., :3]
+        if inverted:
+            rgb = np.where(np.arange(3) == int(inverted[0]), 255 - rgb, rgb)
+        return _resize(rgb, width, height)
 
     def channel(name: str) -> UInt8 | None:
         if not name:
             return None
         file, _, number = name.partition("!")
         whole = pixels[file]
-        at = int(number or 0)
-        full = np.full(whole.shape[:2], 255, np.uint8)
-        return _resize(whole[..., at] if at < whole.shape[2] else full, width, height)
+        at = int(number.rstrip("-") or 0)
+        values = whole[..., at] if at < whole.shape[2] else np.full(whole.shape[:2], 255, np.uint8)
+        return _resize(255 - values if number.endswith("-") else values, width, height)
 
     alpha = channel(maps.alpha)
     if alpha is not None:

@@ -145,7 +145,8 @@ def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
     findings = tuple(check_folder(folder, library))
     if not findings:
         raise AssetError(
-            f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, DAE, USD, URDF, MJCF, SDF"
+            f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, DAE, USD, URDF, MJCF, SDF, HDR "
+            "or EXR, or an assets.yaml that lists textures or plates"
         )
     _print_findings(findings)
     if sheet is not None:

@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 
 from gen_data.assets.folder_index import PlateEntry
+from gen_data.assets.image_decoding import PHOTO_SUFFIXES, decode_image, why_unread
 from gen_data.assets.plates.plate_import import locate_camera
 from gen_data.config.merging import node_name
 from gen_data.config.yaml_tree import parse_yaml
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from gen_data.lab.edit.samples import Studio
     from gen_data.preview.overlay import Image
 
-PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".webp"})
 SIZE_MAX_BYTES = 200_000_000
 """Larger files are copied to the folder by hand: a browser reads them into memory."""
 PICTURE_PX, PHOTO_PX = 480, 720
@@ -120,7 +120,7 @@ def plain_name(given: str) -> str:
 
 def is_photograph(name: str) -> bool:
     """Whether a file is a photograph by its name."""
-    return Path(name).suffix.lower() in PHOTOS
+    return Path(name).suffix.lower() in PHOTO_SUFFIXES
 
 
 def check_mesh(folder: Path, name: str, changes: dict[str, Any]) -> Checked:
@@ -133,8 +133,9 @@ def check_mesh(folder: Path, name: str, changes: dict[str, Any]) -> Checked:
     from gen_data.cli.own_meshes import guess_unit
 
     if Path(name).suffix.lower() not in MESH_SUFFIXES:
-        known = ", ".join(sorted({*PHOTOS, *MESH_SUFFIXES}))
-        raise AssetError(f"{name}: is neither a mesh nor a photograph; expected {known}")
+        known = ", ".join(sorted({*PHOTO_SUFFIXES, *MESH_SUFFIXES}))
+        why = why_unread(PurePath(name)) or f"is neither a mesh nor a photograph; expected {known}"
+        raise AssetError(f"{name}: {why}")
     checked = _check(folder, "assets", {"file": name, "category": _category(name), **changes})
     if checked.finding.unit == "m (assumed)" and checked.finding.size_m and not changes:
         unit = guess_unit(max(checked.finding.size_m))
@@ -152,10 +153,8 @@ def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked
     Raises:
         AssetError: it cannot be used; the text states why.
     """
-    from gen_data.assets.image_decoding import decode_image
-
     data = (folder / name).read_bytes()
-    rgb = decode_image(data, name)
+    rgb = decode_image(data, name, color=True)
     size_px = rgb.shape[1], rgb.shape[0]
 
     def locate(one: Standpoint) -> Plate:

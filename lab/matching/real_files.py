@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.assets import image_decoding, sandbox
+from gen_data.assets.asset_arrays import encode_text
 from gen_data.core.asset_types import UInt8
 from gen_data.core.capture import POINT, Channel
 from gen_data.core.errors import AssetError, StorageError
@@ -24,7 +25,6 @@ from gen_data.lab.matching.recordings import ImageLabels, Photo, Scan
 
 T = TypeVar("T")
 
-PHOTO_ENDINGS = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 SCAN_ENDINGS = frozenset({".bin", ".pcd", ".ply", ".npy"})
 NO_PHOTOS = frozenset(channel.value for channel in Channel if channel is not Channel.RGB)
 """Names of folders that hold label images."""
@@ -61,13 +61,14 @@ class Inventory:
 
 @dataclass(frozen=True)
 class RealFiles:
-    """The files of a folder by kind, sorted by path."""
+    """The files of a folder by kind, sorted by path; ``unread`` are pictures in other formats."""
 
     folder: Path
     photos: tuple[Path, ...]
     scans: tuple[Path, ...]
     coco: tuple[Path, ...]
     kitti: tuple[Path, ...]
+    unread: tuple[Path, ...] = ()
 
 
 def find_files(folder: Path) -> RealFiles:
@@ -81,7 +82,7 @@ def find_files(folder: Path) -> RealFiles:
             f"{folder}: is not a folder; expected one with photographs or laser scans"
         )
     seen: set[tuple[int, int]] = set()
-    photos, scans, coco, kitti = [], [], [], []
+    photos, scans, coco, kitti, unread = [], [], [], [], []
     for path in files_below(folder):
         inner = path.relative_to(folder).parts
         if any(part.startswith(".") for part in inner):
@@ -91,7 +92,7 @@ def find_files(folder: Path) -> RealFiles:
         if status.st_ino and (status.st_dev, status.st_ino) in seen:
             continue
         seen.add((status.st_dev, status.st_ino))
-        if ending in PHOTO_ENDINGS and not NO_PHOTOS.intersection(parents):
+        if ending in image_decoding.PHOTO_SUFFIXES and not NO_PHOTOS.intersection(parents):
             photos.append(path)
         elif ending in SCAN_ENDINGS:
             scans.append(path)
@@ -99,13 +100,17 @@ def find_files(folder: Path) -> RealFiles:
             coco.append(path)
         elif ending == ".txt" and parents[-1:] == ("label_2",):
             kitti.append(path)
+        elif ending in image_decoding.UNREAD:
+            unread.append(path)
     if not photos and not scans:
+        counts = Counter(map(image_decoding.why_unread, unread))
+        others = "".join(f"; {count} {why}" for why, count in counts.items())
         raise StorageError(
-            f"{folder}: holds no photographs ({', '.join(sorted(PHOTO_ENDINGS))}) and no laser"
-            f" scans ({', '.join(sorted(SCAN_ENDINGS))})"
+            f"{folder}: holds no photographs ({', '.join(sorted(image_decoding.PHOTO_SUFFIXES))})"
+            f" and no laser scans ({', '.join(sorted(SCAN_ENDINGS))}){others}"
         )
-    instances = [path for path in coco if path.stem.startswith("instances")]
-    return RealFiles(folder, tuple(photos), tuple(scans), tuple(instances or coco), tuple(kitti))
+    coco = [path for path in coco if path.stem.startswith("instances")] or coco
+    return RealFiles(folder, *map(tuple, (photos, scans, coco, kitti, unread)))
 
 
 def files_below(folder: Path) -> list[Path]:
@@ -141,8 +146,11 @@ def choose_evenly(files: Sequence[T], limit: int) -> list[T]:
 
 def read_photos(files: RealFiles, limit: int, inventory: Inventory) -> Iterator[Photo]:
     """Read photographs one after the other; unusable ones are counted."""
-    inventory.found["photographs"] = len(files.photos)
-    sizes: Counter[tuple[int, int]] = Counter()
+    inventory.found["photographs"] = len(files.photos) + len(files.unread)
+    for path in files.unread:
+        why = image_decoding.why_unread(path)
+        inventory.skip("photographs", why, path.relative_to(files.folder))
+    sizes, remarks = Counter[tuple[int, int]](), Counter[str]()
     for path in choose_evenly(files.photos, limit):
         name = str(path.relative_to(files.folder))
         try:
@@ -153,11 +161,14 @@ def read_photos(files: RealFiles, limit: int, inventory: Inventory) -> Iterator[
         width, height = (int(side) for side in arrays["size_px"])
         inventory.used["photographs"] += 1
         sizes[width, height] += 1
+        remarks.update(_remarks(arrays))
         steps = arrays["quantisation"] if len(arrays["quantisation"]) else None
         yield Photo(name, arrays["rgb"], (width, height), steps)
     shown = ", ".join(f"{count} of {w} x {h} px" for (w, h), count in sizes.most_common(3))
     more = f", {len(sizes) - 3} other sizes" if len(sizes) > 3 else ""
-    inventory.notes["photographs"] = shown + more
+    inventory.notes["photographs"] = "; ".join(
+        [shown + more, *(f"{count}: {text}" for text, count in remarks.items())]
+    )
 
 
 def _reason(error: AssetError, path: Path) -> str:
@@ -171,6 +182,7 @@ def decode_photo(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]
     Returns:
         ``rgb``: uint8 [h, w, 3], the middle of large photographs. ``size_px``: whole width and
         height. ``quantisation``: the luma table of a JPEG file, int64 [64] in any order, else [0].
+        ``remarks``: lines of text.
 
     Raises:
         AssetError: it is unreadable, too small or has no colours.
@@ -182,7 +194,7 @@ def decode_photo(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]
     (name,) = files
     path = root / name
     data = path.read_bytes()
-    rgb = image_decoding.decode_image(data, str(path))
+    rgb = image_decoding.decode_image(data, str(path), color=True)
     height, width = rgb.shape[:2]
     if min(width, height) < SIDE_MIN_PX:
         raise AssetError(f"{path}: smaller than {SIDE_MIN_PX} px; leave it out")
@@ -194,12 +206,30 @@ def decode_photo(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]
         tables = getattr(image, "quantization", None) or {}
         steps = np.array(tables[min(tables)] if tables else [], np.int64)
     size_px = np.array([width, height], np.int64)
-    return {"rgb": _middle(rgb), "size_px": size_px, "quantisation": steps}
+    return {
+        "rgb": _middle(rgb),
+        "size_px": size_px,
+        "quantisation": steps,
+        "remarks": _encode_remarks(data),
+    }
 
 
-def read_rgb(path: Path) -> UInt8:
-    """A whole image as RGB [h, w, 3]. Raises AssetError if it cannot be decoded."""
-    return sandbox.run_sandboxed(_decode_rgb, path.parent, {path.name: ""})["rgb"]
+def read_picture(path: Path) -> tuple[UInt8, tuple[str, ...]]:
+    """A whole image as RGB [h, w, 3], and remarks on its unused contents.
+
+    Raises:
+        AssetError: it cannot be decoded.
+    """
+    arrays = sandbox.run_sandboxed(_decode_rgb, path.parent, {path.name: ""})
+    return arrays["rgb"], _remarks(arrays)
+
+
+def _encode_remarks(data: bytes) -> UInt8:
+    return encode_text("\n".join(image_decoding.image_remarks(data)))
+
+
+def _remarks(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, ...]:
+    return tuple(arrays["remarks"].tobytes().decode().splitlines())
 
 
 def _decode_rgb(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]]:
@@ -210,7 +240,8 @@ def _decode_rgb(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]]
         data = path.read_bytes()
     except OSError as error:
         raise AssetError(f"{path}: {error.strerror}") from None
-    return {"rgb": image_decoding.decode_image(data, str(path))}
+    rgb = image_decoding.decode_image(data, str(path), color=True)
+    return {"rgb": rgb, "remarks": _encode_remarks(data)}
 
 
 def _middle(rgb: UInt8) -> UInt8:

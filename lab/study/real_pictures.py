@@ -8,16 +8,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from gen_data.assets.image_decoding import PHOTO_SUFFIXES, UNREAD, why_unread
 from gen_data.core.asset_types import UInt8
 from gen_data.core.errors import AssetError, ConfigError, StorageError, list_names
 from gen_data.lab.matching import label_files
 from gen_data.lab.matching.label_files import RealObject
-from gen_data.lab.matching.real_files import choose_evenly, files_below, read_rgb
+from gen_data.lab.matching.real_files import choose_evenly, files_below, read_picture
 
 _UNSTATED = (0, 0)
 _IMAGES = re.compile(rb'"(images|annotations)"\s*:\s*\[\s*[{\]]')
 """A list of objects: plans of data sets have lists of names there."""
-_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 _AMBIGUOUS = "image whose name several files have"
 _WORD_MIN = 3
 """Letters from which on the beginning of a split's name stands for it: ``val`` for ``valid``."""
@@ -178,7 +178,7 @@ def check_judges(real: RealSet) -> None:
 def read_image(path: Path) -> UInt8:
     """RGB image [h, w, 3]. Raises StorageError if it cannot be read."""
     try:
-        return read_rgb(path)
+        return read_picture(path)[0]
     except AssetError as error:
         raise StorageError(str(error)) from error
 
@@ -373,7 +373,7 @@ def _is_split(folder: str, words: Iterable[str]) -> bool:
 
 
 def _read_kitti(root: Path, most: int | None) -> RealSet:
-    images = {path.stem: path for path in sorted((root / "image_2").glob("*")) if _is_image(path)}
+    images = {path.stem: path for path in _images_among((root / "image_2").glob("*"))}
     frames = []
     for number, path in enumerate(sorted((root / "label_2").glob("*.txt")), 1):
         image = images.get(path.stem, root / f"image_2/{path.stem}.png")
@@ -396,14 +396,14 @@ def _read_yolo(root: Path, classes: Path, split: str, most: int | None) -> RealS
         folders = {_yolo_labels(place / "image.png").parent for place in places if place.is_dir()}
         listed = {path for folder in folders for path in files_below(folder)} | images.keys()
     else:
-        images = {_yolo_labels(path): path for path in below if _is_image(path)}
+        images = {_yolo_labels(path): path for path in _images_among(below)}
         listed = {p for p in below if "labels" in p.relative_to(root).parts} | images.keys()
     labels = {path for path in listed if path.suffix == ".txt" and path.is_file()}
     # LabelImg puts its list of classes next to the labels.
     labels = {path for path in labels if path != classes and path.name != "classes.txt"}
     skipped, frames = Counter[str](), []
     for number, path in enumerate(sorted(labels | images.keys()), 1):
-        if path not in labels:
+        if path not in labels and not why_unread(images[path]):
             skipped["image without a label file, read as one without objects"] += 1
         objects = label_files.read_yolo(path, names, has_keypoints) if path in labels else ()
         image = images.get(path, path.with_suffix(".png"))
@@ -416,7 +416,7 @@ def _listed_images(places: Iterable[Path]) -> Iterator[Path]:
     """Images in folders, of lists, and single ones."""
     for place in places:
         if place.is_dir():
-            yield from filter(_is_image, files_below(place))
+            yield from _images_among(files_below(place))
         elif place.suffix == ".txt":
             for line in filter(None, map(str.strip, place.read_text("utf-8-sig").splitlines())):
                 # Ultralytics takes names that begin with ./ from the list's folder.
@@ -447,7 +447,7 @@ def _voc_image(path: Path, stated: Path) -> Path:
         at = len(path.parts) - path.parts[::-1].index("Annotations")
         near, inner = Path(*path.parts[: at - 1]), Path(*path.parts[at:-1])
     folders = (near / "JPEGImages" / inner, path.parent, near / "images" / inner, near / inner)
-    same = [f"{path.stem}{suffix}" for suffix in _SUFFIXES]
+    same = [f"{path.stem}{e}" for s in (*PHOTO_SUFFIXES, *UNREAD) for e in (s, s.upper())]
     names = [stated.name, *same] if stated.stem == path.stem else [*same, stated.name]
     listed = (folder / name for name in names if name for folder in folders)
     return next(filter(Path.is_file, listed), folders[0] / f"{path.stem}.jpg")
@@ -462,8 +462,10 @@ def _numbered(
     return _checked(RealSet(source, tuple(_readable(frames, most, skipped)), ids, skipped))
 
 
-def _is_image(path: Path) -> bool:
-    return path.suffix.lower() in _SUFFIXES
+def _images_among(paths: Iterable[Path]) -> list[Path]:
+    """Sorted images; unread formats come first, so readable images of a name replace them."""
+    images = (p for p in paths if p.suffix.lower() in PHOTO_SUFFIXES or why_unread(p))
+    return sorted(images, key=lambda path: (not why_unread(path), path))
 
 
 def _readable(
@@ -480,14 +482,19 @@ def _readable(
         if not frame.path.is_file():
             skipped["image that is missing"] += 1
             continue
+        if why := why_unread(frame.path):
+            skipped[f"image: {why}"] += 1
+            continue
         try:
-            height, width = read_image(frame.path).shape[:2]
-        except StorageError:
+            pixels, remarks = read_picture(frame.path)
+        except AssetError:
             skipped["image that cannot be read"] += 1
             continue
+        height, width = pixels.shape[:2]
         if frame.stated_px not in (_UNSTATED, (width, height)):
             skipped["image of another size than its labels state"] += 1
             continue
+        skipped.update(f"part of an image that is read: {text}" for text in remarks)
         objects = _scaled(frame.objects, width, height) if frame.is_relative else frame.objects
         if empty := sum(not _has_area(thing) for thing in objects):
             skipped["object with an empty box"] += empty

@@ -367,6 +367,46 @@ def test_names_of_maps_survive_any_file_name_and_several_sizes_take_the_largest(
     assert texture.albedo.shape == (4, 8, 3) and (texture.albedo == 70).all()
 
 
+@pytest.mark.parametrize(
+    ("key", "file", "texel", "expected"),
+    [
+        ("normal", "rock_nor_dx_2k.png", (128, 200, 220), [128, 55, 220]),
+        ("normal", "Rock049_2K-PNG_NormalDX.png", (128, 200, 220), [128, 55, 220]),
+        ("normal", "rock_normal_directx.png", (128, 200, 220), [128, 55, 220]),
+        ("normal", "rock_nor_gl_2k.png", (128, 200, 220), [128, 200, 220]),
+        ("normal", "Rock049_NormalGL.png", (128, 200, 220), [128, 200, 220]),
+        ("normal", "nor_dx/rock.png", (128, 200, 220), [128, 200, 220]),
+        ("roughness", "rock_GLOSS_2K.png", (200, 200, 200), 55),
+        ("roughness", "rock_glossiness.png", (200, 200, 200), 55),
+        ("roughness", "rock_rough_2k.png", (200, 200, 200), 200),
+        ("roughness", "paint_gloss_roughness.png", (200, 200, 200), 200),
+        ("roughness", "glossy_rock.png", (200, 200, 200), 200),
+    ],
+)
+def test_maps_for_directx_and_gloss_are_inverted_by_their_names_and_named(
+    folder: Path, key: str, file: str, texel: tuple[int, int, int], expected: object
+) -> None:
+    """Names of Poly Haven, ambientCG and Poliigon; as a texture and on an object."""
+    (folder / file).parent.mkdir(exist_ok=True)
+    Image.new("RGB", (2, 2), texel).save(folder / file)
+    Image.new("RGB", (2, 2), 90).save(folder / "c.png")
+    triangle(folder, "newmtl m\n")
+    maps = f"maps: {{color: c.png, {key}: {file}}}"
+    (folder / "assets.yaml").write_text(
+        f"textures: [{{id: rock, {maps}}}]\n"
+        f'assets: [{{id: t, file: t.obj, materials: {{"*": {{{maps}}}}}}}]\n'
+    )
+    library = open_library([folder], cache_dir=folder.parent / "cache")
+    on_object = library.mesh("user/t").materials[0].texture
+    for name in ("user/rock", on_object):
+        found = getattr(library.texture(name), key)
+        assert found[0, 0].tolist() == expected
+    is_inverted = expected in ([128, 55, 220], 55)
+    for name in ("user/rock", "user/t"):
+        files = [one.file for one in library.remarks(name) or ()]
+        assert files == [str(folder / file)] * is_inverted
+
+
 def test_coverage_that_no_face_reaches_is_left_out(folder: Path) -> None:
     """An atlas that is transparent next to the triangle's corner of it: the mesh stays solid."""
     atlas = np.full((8, 8, 4), 200, np.uint8)

@@ -72,6 +72,26 @@ def test_a_limit_chooses_files_evenly_and_folders_without_any_are_refused(tmp_pa
         real_files.find_files(tmp_path)
 
 
+def test_pictures_and_films_in_other_formats_are_counted_with_a_remedy(tmp_path: Path) -> None:
+    """As telephones and cameras name them, next to a JPEG that is read."""
+    for name in ("IMG_1.HEIC", "IMG_2.heic", "IMG_1.MOV", "_DSC1.NEF", "notes.txt"):
+        (tmp_path / name).write_bytes(b"content")
+    reasons = {
+        "HEIC files are not read: save them as JPEG or PNG": 2,
+        "MOV files are not read: save their frames as PNG": 1,
+        "NEF files are not read: develop them to JPEG or TIFF": 1,
+    }
+    with pytest.raises(StorageError) as refused:
+        real_files.find_files(tmp_path)
+    assert all(f"; {count} {why}" in str(refused.value) for why, count in reasons.items())
+    save(tmp_path / "_DSC1.JPG")
+    inventory = real_files.Inventory()
+    photos = list(real_files.read_photos(real_files.find_files(tmp_path), 100, inventory))
+    assert [photo.name for photo in photos] == ["_DSC1.JPG"]
+    assert inventory.skipped == {("photographs", why): n for why, n in reasons.items()}
+    assert inventory_rows(inventory)[0][:4] == ("photographs", "5", "1", "4")
+
+
 def points(n: int = 200) -> np.ndarray:
     rng = np.random.default_rng(1)
     made = np.zeros(n, POINT)

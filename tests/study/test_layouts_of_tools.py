@@ -220,6 +220,26 @@ def test_vocs_images_have_the_names_of_their_annotations(tmp_path: Path) -> None
     assert read_real(tmp_path).pictures[0].objects[0].box == (0.5, 2.0, 20.25, 30.0)
 
 
+@pytest.mark.parametrize(
+    ("layout", "folder"), [("voc", "JPEGImages"), ("kitti", "image_2"), ("yolo", "images")]
+)
+def test_images_in_other_formats_are_named_where_their_labels_are_read(
+    layout: str, folder: str, tmp_path: Path
+) -> None:
+    """VOC, KITTI and YOLO name images without their format; a JPEG of the name is preferred."""
+    write(tmp_path / "Annotations/IMG_1.xml", VOC.format("IMG_1"))
+    write(tmp_path / "label_2/IMG_1.txt", "Car 0 0 0 1 2 3 4\n")
+    write(tmp_path / "labels/IMG_1.txt", BOX)
+    write(tmp_path / "classes.txt", "cup\n")
+    write(tmp_path / folder / "IMG_1.HEIC", "content")
+    reason = "1 x image: HEIC files are not read: save them as JPEG or PNG"
+    with pytest.raises(StorageError, match=reason):
+        read_real(tmp_path, layout=layout)
+    write_picture(tmp_path / folder / "IMG_1.JPG")
+    (picture,) = read_real(tmp_path, layout=layout).pictures
+    assert (picture.path.suffix, len(picture.objects)) == (".JPG", 1)
+
+
 def test_vocs_folders_may_have_folders(tmp_path: Path) -> None:
     for split in ("train", "val"):
         write_picture(tmp_path / f"JPEGImages/{split}/1.png")

@@ -31,7 +31,7 @@ def import_plate(folder: Folder, entry: PlateEntry) -> plates.Plate:
     """
     place = str(folder.root / entry.file)
     data = folder.read(entry.file)
-    rgb = decode_image(data, place)
+    rgb = decode_image(data, place, color=True)
     plate = locate_camera(entry, data, rgb, place)
     _check_ground(plate, place)
     hidden = _read_mask(folder, entry, plate)
