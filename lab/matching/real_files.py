@@ -214,6 +214,11 @@ def decode_photo(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]
     }
 
 
+def read_rgb(path: Path) -> UInt8:
+    """A whole image as RGB [h, w, 3]. Raises AssetError if it cannot be decoded."""
+    return read_picture(path)[0]
+
+
 def read_picture(path: Path) -> tuple[UInt8, tuple[str, ...]]:
     """A whole image as RGB [h, w, 3], and remarks on its unused contents.
 

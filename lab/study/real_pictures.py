@@ -13,7 +13,7 @@ from gen_data.core.asset_types import UInt8
 from gen_data.core.errors import AssetError, ConfigError, StorageError, list_names
 from gen_data.lab.matching import label_files
 from gen_data.lab.matching.label_files import RealObject
-from gen_data.lab.matching.real_files import choose_evenly, files_below, read_picture
+from gen_data.lab.matching.real_files import choose_evenly, files_below, read_picture, read_rgb
 
 _UNSTATED = (0, 0)
 _IMAGES = re.compile(rb'"(images|annotations)"\s*:\s*\[\s*[{\]]')
@@ -178,7 +178,7 @@ def check_judges(real: RealSet) -> None:
 def read_image(path: Path) -> UInt8:
     """RGB image [h, w, 3]. Raises StorageError if it cannot be read."""
     try:
-        return read_picture(path)[0]
+        return read_rgb(path)
     except AssetError as error:
         raise StorageError(str(error)) from error
 
