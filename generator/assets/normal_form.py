@@ -37,8 +37,8 @@ def normal_form(
 ) -> MeshData:
     """Convert a soup in metres, Z up, to a mesh.
 
-    The file's normals are kept if they agree with the triangles and are not all flat; otherwise
-    normals are computed.
+    The file's normals are kept where they agree with their triangle, unless all are flat and not
+    meant (``keeps_facets``); others are computed.
 
     Args:
         soup: Triangles; ``Material.texture`` empty or a texture id.
@@ -66,8 +66,11 @@ def normal_form(
         # Far beyond any repetition: exporters write such values on unused corners.
         uvs = np.where(np.abs(uvs) > _MAX_UV, 0.0, uvs)
     soup = replace(soup, uvs=uvs)
-    own = _valid_normals(soup)
-    return make_mesh(soup, _crease_normals(soup, faces, crease_deg) if own is None else own)
+    normals, valid = _read_normals(soup)
+    if not valid.all():
+        computed = _crease_normals(soup, faces, crease_deg)
+        normals = np.where(valid[:, None, None], normals, computed)
+    return make_mesh(soup, normals)
 
 
 def check_coordinates(soup: TriangleSoup, place: str) -> None:
@@ -249,13 +252,17 @@ def _flip_faces(soup: TriangleSoup, faces: Int64, flip: Bools) -> tuple[Triangle
     return soup, np.where(flip[:, None], faces[:, ::-1], faces)
 
 
-def _valid_normals(soup: TriangleSoup) -> Float64 | None:
-    """The file's unit normals, if they point outward and at least one differs from its face's."""
-    if soup.normals is None or not np.isfinite(soup.normals).all():
-        return None
-    normals = _normalize(soup.normals)
+def _read_normals(soup: TriangleSoup) -> tuple[Float64, Bools]:
+    """The file's unit normals, and a mask [m] of triangles where they point outward and are meant.
+
+    Flat normals alone are not meant, unless the soup states so.
+    """
+    known = np.zeros_like(soup.corners) if soup.normals is None else soup.normals
+    normals = _normalize(np.where(np.isfinite(known), known, 0.0))
     agreement = (normals * _normalize(face_crosses(soup.corners))[:, None]).sum(axis=2)
-    return normals if (agreement > 0.2).all() and (agreement < 0.9999).any() else None
+    valid = (agreement > 0.2).all(axis=1)
+    meant = soup.keeps_facets or bool((agreement[valid] < 0.9999).any())
+    return normals, valid & meant
 
 
 def _crease_normals(soup: TriangleSoup, faces: Int64, crease_deg: float) -> Float64:

@@ -45,7 +45,7 @@ class TriangleSoup:
     Attributes:
         corners: float64 [m, 3, 3]: triangle, corner, xyz, in the unit and axes of the file.
         uvs: float64 [m, 3, 2], (0, 0) at the image's bottom left; None = none.
-        normals: float64 [m, 3, 3] as in the file, unchecked; None = none.
+        normals: float64 [m, 3, 3] as in the file, unchecked; zero or None = none.
         face_slots: int64 [m].
         face_groups: int64 [m]: number of the named object in the file.
         slots: One per value of ``face_slots``.
@@ -53,6 +53,8 @@ class TriangleSoup:
             not known.
         colors: float64 [m, 3, 3]: linear RGB in [0, 1] at each corner, a factor on the base colour;
             None = none.
+        keeps_facets: Whether normals are meant if all are flat; exporters of most formats write
+            such without being asked.
     """
 
     corners: Float64
@@ -63,6 +65,7 @@ class TriangleSoup:
     slots: tuple[MaterialSlot, ...]
     group_names: tuple[str, ...] = ()
     colors: Float64 | None = None
+    keeps_facets: bool = False
 
     @classmethod
     def of(
@@ -123,8 +126,7 @@ def apply_affine(matrix: Float64, points: Float64) -> Float64:
 def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
     """Concatenate soups; their slots and groups stay separate.
 
-    If any soup has UVs, missing ones become zero; missing colours become white. Normals are kept
-    only if all soups have them.
+    If any soup has UVs or normals, missing ones become zero; missing colours become white.
     """
     if len(soups) == 1:
         return soups[0]
@@ -138,19 +140,31 @@ def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
         first_group += count
     has_uvs = any(s.uvs is not None for s in soups)
     uvs = [np.zeros((len(s), 3, 2)) if s.uvs is None else s.uvs for s in soups]
-    normals = [s.normals for s in soups if s.normals is not None]
+    has_normals = any(s.normals is not None for s in soups)
+    normals = [np.zeros_like(s.corners) if s.normals is None else s.normals for s in soups]
     has_colors = any(s.colors is not None for s in soups)
     colors = [np.ones((len(s), 3, 3)) if s.colors is None else s.colors for s in soups]
     return TriangleSoup(
         corners=np.concatenate([s.corners for s in soups]),
         uvs=np.concatenate(uvs) if has_uvs else None,
-        normals=np.concatenate(normals) if len(normals) == len(soups) else None,
+        normals=np.concatenate(normals) if has_normals else None,
         face_slots=np.concatenate(slots),
         face_groups=np.concatenate(groups),
         slots=tuple(slot for s in soups for slot in s.slots),
         group_names=tuple(names) if any(names) else (),
         colors=np.concatenate(colors) if has_colors else None,
+        keeps_facets=any(s.keeps_facets for s in soups),
     )
+
+
+def without_degenerate(soup: TriangleSoup) -> TriangleSoup:
+    """The triangles that have an area; all, if none has.
+
+    Nodes of scale 0 hide their meshes: their points would count for bounds and collision.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        solid = (face_crosses(soup.corners) != 0.0).any(axis=1)
+    return soup if solid.all() or not solid.any() else soup.select(solid)
 
 
 def face_crosses(corners: Float64) -> Float64:

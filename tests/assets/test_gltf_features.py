@@ -103,6 +103,61 @@ def test_morph_targets_apply_by_their_weights_at_rest(builder: Builder, tmp_path
     assert builder.read(tmp_path).soup.corners[0][:, 2].tolist() == [1.0, 1.0, 1.0]
 
 
+def test_morph_targets_move_normals_and_leave_them_without_own_ones(
+    builder: Builder, tmp_path: Path
+) -> None:
+    """At weight 0.5, (0, 0, 1) plus half of (0.6, 0, -0.4) is (0.3, 0, 0.8)."""
+    builder.attributes["NORMAL"] = builder.accessor(np.array([[0, 0, 1]] * 3, "<f4"))
+    still = builder.accessor(np.zeros((3, 3), "<f4"))
+    turn = builder.accessor(np.array([[0.6, 0, -0.4]] * 3, "<f4"))
+    builder.tree["meshes"][0]["weights"] = [0.5, 1.0]
+    builder.primitive["targets"] = [{"POSITION": still, "NORMAL": turn}, {"POSITION": still}]
+    normals = builder.read(tmp_path).soup.normals
+    assert normals is not None
+    assert normals[0] == pytest.approx(np.array([[0.3, 0, 0.8]] * 3))
+
+
+def test_triangles_without_normals_are_flat_next_to_smooth_ones(
+    builder: Builder, tmp_path: Path
+) -> None:
+    """A ridge of 20 degrees without normals, next to a triangle with some; glTF 2.0, 3.7.2.1."""
+    tilted = np.array([[0.6, 0, 0.8], [0, 0.6, 0.8], [0, 0, 1]], "<f4")
+    builder.attributes["NORMAL"] = builder.accessor(tilted)
+    c, s = np.cos(np.radians(20)), np.sin(np.radians(20))
+    ridge = np.array([[5, 0, 0], [5, 1, 0], [5 - c, 0, s], [6, 0, 0]], "<f4")
+    indices = builder.accessor(np.array([0, 1, 2, 0, 3, 1], "<u2"))
+    rough = {"attributes": {"POSITION": builder.accessor(ridge)}, "indices": indices}
+    builder.tree["meshes"][0]["primitives"].append(rough)
+    builder.write(tmp_path)
+    mesh = import_object(Folder(tmp_path), MeshEntry(file="a.gltf", up="z"), "user/a").mesh
+    assert mesh is not None
+    expected = [tilted, [[s, 0, c]] * 3, [[0, 0, 1]] * 3]
+    assert mesh.normals[mesh.faces] == pytest.approx(np.array(expected), abs=1e-4)
+
+
+def test_a_mesh_of_scale_0_has_no_place(builder: Builder, tmp_path: Path) -> None:
+    """100 m away: it would be the object's border, and move its origin."""
+    hidden = {"mesh": 0, "scale": [0, 0, 0], "translation": [100, 0, 0]}
+    builder.tree["nodes"] = [{"mesh": 0}, {"children": [2], "rotation": [0.6, 0, 0, 0.8]}, hidden]
+    builder.tree["scenes"] = [{"nodes": [0, 1]}]
+    builder.write(tmp_path)
+    imported = import_object(Folder(tmp_path), MeshEntry(file="a.gltf", up="z"), "user/a")
+    assert imported.shift_m == (-0.5, -0.5, 0.0)
+    assert imported.mesh is not None and len(imported.mesh.faces) == 1
+    assert imported.mesh.bounds_m() == ((-0.5, -0.5, 0.0), (0.5, 0.5, 0.0))
+
+
+@pytest.mark.parametrize("length", [0.5, 0.9999, 1.0, 2.0])
+def test_quaternions_of_any_length_are_turns(
+    builder: Builder, tmp_path: Path, length: float
+) -> None:
+    """A quarter turn about Z takes X to Y."""
+    half = length * np.sqrt(0.5)
+    builder.tree["nodes"][0]["rotation"] = [0, 0, half, half]
+    corners = builder.read(tmp_path).soup.corners[0]
+    assert corners == pytest.approx(np.array([[0, 0, 0], [0, 1, 0], [-1, 0, 0]]))
+
+
 def test_sparse_accessors_replace_single_values(builder: Builder, tmp_path: Path) -> None:
     """Point 1 is replaced; without a buffer view, the others are zero."""
     sparse = {"count": 1,

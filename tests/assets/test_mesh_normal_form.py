@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from gen_data.assets.normal_form import normal_form
-from gen_data.assets.triangle_soup import MaterialSlot, TriangleSoup, box, cylinder, sphere
+from gen_data.assets.triangle_soup import (
+    MaterialSlot,
+    TriangleSoup,
+    box,
+    cylinder,
+    face_crosses,
+    join_soups,
+    sphere,
+)
 from gen_data.core.asset_types import Material, MeshData
 from gen_data.core.errors import AssetError
 
@@ -107,6 +115,38 @@ def test_good_normals_of_a_file_are_kept_and_bad_ones_replaced(normals: Any, kep
     soup = TriangleSoup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
     found = normal_form(replace(soup, normals=np.array([normals])), "t").normals
     assert found == pytest.approx(np.array(normals if kept else [[0.0, 0.0, 1.0]] * 3))
+
+
+def test_normals_are_kept_next_to_triangles_without_usable_ones() -> None:
+    """Two balls with tilted normals, one of them backward, and with none."""
+    corners = sphere(0.1)
+    up = np.array([0.0, 0.0, 0.3])
+    tilted = corners / 0.1 + up
+    tilted /= np.linalg.norm(tilted, axis=2, keepdims=True)
+    given = tilted.copy()
+    given[100, 0] *= -1.0
+    first = replace(TriangleSoup.of(corners), normals=given)
+    mesh = normal_form(join_soups([first, TriangleSoup.of(corners + 0.5)]), "balls")
+    count = len(mesh.faces) // 2
+    at = mesh.vertices_m[mesh.faces].astype(np.float64)
+    at[count:] -= 0.5
+    radial = at / np.linalg.norm(at, axis=2, keepdims=True)
+    own = radial + up
+    own /= np.linalg.norm(own, axis=2, keepdims=True)
+    found = mesh.normals[mesh.faces]
+    kept = (np.abs(found - own).max(axis=2) < 1e-3).all(axis=1)
+    assert (kept[:count].sum(), kept[count:].sum()) == (count - 1, 0)
+    assert (found[~kept] * radial[~kept]).sum(axis=2).min() > 0.999
+
+
+@pytest.mark.parametrize("meant", [True, False])
+def test_facets_stay_if_the_file_means_them(meant: bool) -> None:
+    """A cylinder of 32 sides whose normals are all flat."""
+    soup = TriangleSoup.of(cylinder(0.05, 0.2))
+    flat = np.repeat(face_crosses(soup.corners)[:, None], 3, axis=1)
+    mesh = normal_form(replace(soup, normals=flat, keeps_facets=meant), "can")
+    deviation = (mesh.normals[mesh.faces] * face_normals(mesh)[:, None]).sum(axis=2).min()
+    assert deviation == pytest.approx(1.0 if meant else math.cos(math.pi / 32), abs=1e-4)
 
 
 def test_a_dense_mesh_is_thinned_out_to_its_budget_and_keeps_its_shape() -> None:

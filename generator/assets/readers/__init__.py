@@ -1,6 +1,7 @@
 """Readers of mesh files, one per format; all return triangle soup."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import PurePosixPath
 
 from gen_data.assets.asset_folder import Folder
@@ -13,6 +14,7 @@ from gen_data.assets.readers.step import read_step
 from gen_data.assets.readers.stl import read_stl
 from gen_data.assets.readers.threemf import read_3mf
 from gen_data.assets.readers.usd import read_usd
+from gen_data.assets.triangle_soup import without_degenerate
 from gen_data.core.errors import AssetError, did_you_mean
 
 __all__ = ["MESH_SUFFIXES", "MeshSource", "read_mesh"]
@@ -52,4 +54,4 @@ def read_mesh(folder: Folder, relative: str, *, materials: bool = True) -> MeshS
     if not len(source.soup):
         raise AssetError(f"{path}: holds no triangles; export it again with its faces")
     check_face_count(len(source.soup), str(path))
-    return source
+    return replace(source, soup=without_degenerate(source.soup))

@@ -26,7 +26,14 @@ from gen_data.assets.readers.gltf_document import (
 from gen_data.assets.readers.gltf_materials import Images, gltf_material
 from gen_data.assets.readers.gltf_nodes import MAX_PARTS, PlacedMesh, placed_meshes
 from gen_data.assets.readers.mesh_source import MAX_FACES, WHITE, MeshSource, locate_file
-from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup, join_soups
+from gen_data.assets.triangle_soup import (
+    Float64,
+    Int64,
+    MaterialSlot,
+    TriangleSoup,
+    face_crosses,
+    join_soups,
+)
 from gen_data.core.asset_types import UInt8
 from gen_data.core.errors import AssetError
 
@@ -155,14 +162,18 @@ def _read_primitive(
     uvs = _read_uvs(document, attributes, look, len(positions))
     slot, colors = _read_colors(document, attributes, look.slot, len(positions))
     zeros = np.zeros(len(faces), dtype=np.int64)
+    corners = positions[faces]
+    # glTF 2.0, 3.7.2.1: a primitive without normals has flat ones.
+    flat = np.repeat(face_crosses(corners)[:, None], 3, axis=1) if normals is None else None
     return TriangleSoup(
-        corners=positions[faces],
+        corners=corners,
         uvs=None if uvs is None else uvs[faces],
-        normals=None if normals is None else normals[faces],
+        normals=flat if normals is None else normals[faces],
         face_slots=zeros,
         face_groups=zeros,
         slots=(slot,),
         colors=None if colors is None else colors[faces],
+        keeps_facets=True,
     )
 
 
@@ -214,14 +225,19 @@ def _morph(
     if sum(weight != 0.0 for weight in weights) < len(targets):
         document.remarks.append("morph targets of weight 0 are not used")
     for weight, target in zip(weights, targets, strict=False):
-        if weight == 0.0 or "POSITION" not in target:
-            continue
-        moved = read_accessor(document, target["POSITION"], 3)
-        if len(moved) != len(positions):
-            raise ValueError("a morph target of another size")
-        # The deformed surface gets normals of its triangles.
-        positions, normals = positions + weight * moved, None
+        if weight != 0.0:
+            positions = _displaced(document, target, "POSITION", weight, positions)
+            if normals is not None:
+                normals = _displaced(document, target, "NORMAL", weight, normals)
     return positions, normals
+
+
+def _displaced(
+    document: Document, target: Mapping[str, Any], name: str, weight: float, values: Float64
+) -> Float64:
+    """Positions or normals [n, 3], moved by a morph target if it has them."""
+    moved = _optional_attribute(document, target, name, 3, len(values))
+    return values if moved is None else values + weight * moved
 
 
 def _skin(

@@ -1,5 +1,6 @@
 """Placed meshes of a glTF scene: transforms, instances and skins."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -139,7 +140,9 @@ def _local_matrix(node: Mapping[str, Any]) -> Float64:
     if "matrix" in node:
         rows: Float64 = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
         return rows
-    x, y, z, w = (float(v) for v in node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
+    turn = np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64)
+    # Exporters round, and some write quaternions of any length.
+    x, y, z, w = (turn / (math.sqrt((turn * turn).sum()) or 1.0)).tolist()
     rotation = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

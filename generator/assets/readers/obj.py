@@ -171,9 +171,7 @@ def _build_soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup
     return TriangleSoup(
         corners=positions[indices[..., 0] - 1],
         uvs=_look_up(texcoords, indices[..., 1], "vt") if len(texcoords) else None,
-        normals=_look_up(normals, indices[..., 2], "vn")
-        if len(normals) and (indices[..., 2] > 0).all()
-        else None,
+        normals=_look_up(normals, indices[..., 2], "vn") if len(normals) else None,
         face_slots=np.array(s.polygon_materials, dtype=np.int64)[polygon],
         face_groups=np.array(groups, dtype=np.int64)[polygon],
         slots=slots,
