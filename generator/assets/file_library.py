@@ -185,16 +185,15 @@ class FileLibrary:
     def _image_remarks(
         self, one: IndexedAsset, _: str, read: bool
     ) -> tuple[importer.FileRemarks, ...] | None:
-        """Remarks on the colours of a texture, a sky or a photograph; see ``remarks``."""
+        """Remarks on the images of a texture, a sky or a photograph; see ``remarks``."""
         entry, decoder = one.entry, image_decoding.DECODER_VERSION
         key = content_key({"asset": self._key(one), "part": "remarks", "decoder": decoder})
         if not read and self._disk.find(key) is None:
             return None
         images = _images_of(entry.texture_name() if isinstance(entry, TextureEntry) else entry.file)
-        colors = tuple(name for name, channels in images.items() if channels != "stored")
         return self._store.get(
             key,
-            lambda: self._parse(one, parsing.parse_image_remarks, colors),
+            lambda: self._parse(one, parsing.parse_image_remarks, images),
             lambda arrays: parsing.unpack_value(tuple[importer.FileRemarks, ...], arrays),
         )
 

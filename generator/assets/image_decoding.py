@@ -6,7 +6,7 @@ import math
 import re
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
@@ -17,7 +17,7 @@ from gen_data.assets import color_profiles
 from gen_data.core import asset_types, colorimetry, optional_packages
 from gen_data.core.errors import AssetError
 
-DECODER_VERSION = 3
+DECODER_VERSION = 4
 """Increased whenever the same file is decoded to other pixels."""
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 """Suffixes of photographs, in lower case; cameras and telephones also write upper case."""
@@ -39,6 +39,8 @@ MAX_PIXELS = 64_000_000
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
 # Largest negative value, as a share of the brightest texel: resampling filters ring.
 _MAX_RINGING = 1e-4
+# OpenEXR files have rounded values.
+_SAME_CHROMATICITY = 2e-3
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
 _WITH_ALPHA = ("RGBA", "LA", "PA")
 
@@ -56,7 +58,7 @@ def decode_image(
     Sixteen bits per channel become eight; floating-point values count to 1.
 
     Args:
-        data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA.
+        data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA, or OpenEXR, whose colours are linear.
         place: Name of the image in error messages.
         alpha: Keep transparency as a fourth channel, if any pixel is transparent.
         color: Convert colours to sRGB by an embedded profile. Else values stay as stored: they are
@@ -67,6 +69,14 @@ def decode_image(
     """
     from PIL import Image, ImageOps
 
+    if data[:4] == _EXR_MAGIC:
+        linear = read_exr(data, place, color=color)
+        if not color and linear.min() < -_MAX_RINGING * max(float(linear.max()), 1.0):
+            raise AssetError(
+                f"{place}: has values below 0; save it as PNG, with 0 to 1 as 0 to 255"
+            )
+        clipped = np.clip(linear, 0.0, 1.0)
+        return _to_eight_bits(colorimetry.srgb_encode(clipped) if color else clipped)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -97,14 +107,16 @@ def decode_image(
         ) from None
 
 
-def image_remarks(data: bytes) -> tuple[str, ...]:
-    """Unused contents of an encoded image, one phrase each; empty if it is unreadable."""
+def image_remarks(data: bytes, *, color: bool = True) -> tuple[str, ...]:
+    """Unused contents of an image, read as in ``decode_image``; empty if it is unreadable."""
     from PIL import Image
 
     with warnings.catch_warnings(), contextlib.suppress(Exception):
         warnings.simplefilter("ignore")
+        if data[:4] == _EXR_MAGIC:
+            return _exr_remarks(data)
         with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
-            return color_profiles.color_remarks(image)
+            return color_profiles.color_remarks(image) if color else ()
     return ()
 
 
@@ -170,34 +182,114 @@ def decode_radiance(data: bytes, place: str) -> asset_types.Float32:
     return radiance
 
 
-def read_exr(data: bytes, place: str) -> asset_types.Float32:
+def read_exr(data: bytes, place: str, *, color: bool = True) -> asset_types.Float32:
     """Decode an OpenEXR image to RGB, float32 [height, width, 3].
+
+    The first part with colours is read, in its display window; a data window that is twice as wide
+    as high is a whole panorama, as in OpenEXR's environment maps.
+
+    Args:
+        data: The file.
+        place: Its name in error messages.
+        color: Convert stated primaries to Rec. 709; colours outside of it are clipped.
 
     Raises:
         AssetError: if it is unreadable, too large, or lacks a colour, or the library is missing.
     """
+    import OpenEXR
+
+    with _exr_file(data, place) as name:
+        headers = _exr_headers(name)
+        for header in headers:
+            _check_size(*_window(header, "dataWindow")[2:], place)
+            _check_size(*_window(header, "displayWindow")[2:], place)
+        number, names = _color_part(headers)
+        if not names:
+            held = sorted(channel.name for header in headers for channel in header["channels"])
+            raise AssetError(f"{place}: has no channels R, G, B, but {', '.join(held)[:80]}")
+        parts = OpenEXR.File(name, separate_channels=True).parts
+        if number >= len(parts):
+            raise ValueError("incomplete")
+        channels = parts[number].channels
+        rgb = np.stack([channels[one].pixels for one in names], axis=-1).astype(np.float32)
+        if color and "chromaticities" in headers[number]:
+            rgb = _to_rec709(rgb, headers[number]["chromaticities"])
+    return _in_display_window(rgb, headers[number])
+
+
+@contextlib.contextmanager
+def _exr_file(data: bytes, place: str) -> Iterator[str]:
+    """A name of the file for OpenEXR, whose errors become AssetErrors."""
     missing = optional_packages.missing_packages("OpenEXR")
     if missing:
         raise AssetError(f"{place}: {missing}")
-    import OpenEXR
-
     with tempfile.NamedTemporaryFile(suffix=".exr") as file:
         file.write(data)
         file.flush()
         try:
-            window = OpenEXR.File(file.name, header_only=True).header()["dataWindow"]
-            (x0, y0), (x1, y1) = (corner.tolist() for corner in window)
-            _check_size(x1 - x0 + 1, y1 - y0 + 1, place)
-            channels = OpenEXR.File(file.name, separate_channels=True).channels()
+            yield file.name
         except (RuntimeError, ValueError, OSError, KeyError) as error:
             reason = str(error).replace(file.name, "it").strip() or type(error).__name__
             raise AssetError(f"{place}: unreadable OpenEXR image ({reason})") from None
-    names = _color_channels(tuple(channels))
-    if not names:
-        raise AssetError(
-            f"{place}: has no channels R, G, B, but {', '.join(sorted(channels))[:80]}"
-        )
-    return np.stack([channels[name].pixels for name in names], axis=-1).astype(np.float32)
+
+
+def _exr_headers(name: str) -> list[dict[str, Any]]:
+    import OpenEXR
+
+    return [part.header for part in OpenEXR.File(name, header_only=True).parts]
+
+
+def _window(header: Mapping[str, Any], name: str) -> tuple[int, int, int, int]:
+    """Left, top, width and height of a window [px]."""
+    (x0, y0), (x1, y1) = (corner.tolist() for corner in header[name])
+    return x0, y0, x1 - x0 + 1, y1 - y0 + 1
+
+
+def _in_display_window(rgb: asset_types.Float32, header: Mapping[str, Any]) -> asset_types.Float32:
+    """The pixels of the data window, cut to the display window, and black elsewhere."""
+    x, y, width, height = _window(header, "dataWindow")
+    left, top, whole_width, whole_height = _window(header, "displayWindow")
+    if width == 2 * height or (x, y, width, height) == (left, top, whole_width, whole_height):
+        return rgb
+    rows, columns = np.arange(whole_height) + top - y, np.arange(whole_width) + left - x
+    in_rows, in_columns = (rows >= 0) & (rows < height), (columns >= 0) & (columns < width)
+    whole = np.zeros((whole_height, whole_width, 3), np.float32)
+    whole[np.ix_(in_rows, in_columns)] = rgb[np.ix_(rows[in_rows], columns[in_columns])]
+    return whole
+
+
+def _to_rec709(rgb: asset_types.Float32, chromaticities: Sequence[float]) -> asset_types.Float32:
+    """Colours of other primaries; grey stays grey."""
+    if np.allclose(chromaticities, colorimetry.REC709_CHROMATICITIES, atol=_SAME_CHROMATICITY):
+        return rgb
+    matrix = colorimetry.rec709_from_primaries(chromaticities).astype(np.float32)
+    converted = np.einsum("ij,yxj->yxi", matrix, rgb, optimize=False)
+    # Colours outside of Rec. 709 have negative values here; stored ones stay for later checks.
+    clipped: asset_types.Float32 = np.maximum(converted, np.minimum(rgb, 0.0))
+    return clipped
+
+
+def _color_part(headers: Sequence[Mapping[str, Any]]) -> tuple[int, tuple[str, ...]]:
+    """Number of the first part with colours, and their names; empty = there is none."""
+    found = [_color_channels(tuple(c.name for c in header["channels"])) for header in headers]
+    return next(((k, names) for k, names in enumerate(found) if names), (0, ()))
+
+
+def _exr_remarks(data: bytes) -> tuple[str, ...]:
+    with _exr_file(data, "") as name:
+        headers = _exr_headers(name)
+    number, names = _color_part(headers)
+    header = headers[number]
+    # Coverage is 1 in panoramas.
+    unused = {c.name for c in header["channels"]} - {*names, "A"}
+    found = [f"channels that are not used: {', '.join(sorted(unused))}"] if unused else []
+    others = [one["name"] for one in headers if one is not header]
+    found += [f"parts that are not read: {', '.join(others)}"] if others else []
+    if _window(header, "dataWindow") != _window(header, "displayWindow"):
+        *_, width, height = _window(header, "dataWindow")
+        whole = "read as the whole" if width == 2 * height else "the rest is black"
+        found.append(f"its data window is not its display window; {whole}")
+    return tuple(found)
 
 
 def _color_channels(names: tuple[str, ...]) -> tuple[str, ...]:

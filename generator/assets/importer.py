@@ -7,7 +7,7 @@ Mesh and collision parts always share one frame.
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
@@ -26,7 +26,12 @@ from gen_data.assets.readers.mesh_source import MeshSource, srgb_to_linear
 from gen_data.assets.robot_description import RobotDescription, Shape
 from gen_data.assets.robot_formats import is_description, read_description
 from gen_data.assets.robot_shapes import read_shape
-from gen_data.assets.texture_maps import texel_indices, trim_unreached_holes
+from gen_data.assets.texture_maps import (
+    TextureMaps,
+    find_maps,
+    texel_indices,
+    trim_unreached_holes,
+)
 from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
 from gen_data.assets.vertex_colors import IMAGE, resolve_colors
 from gen_data.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
@@ -35,7 +40,7 @@ from gen_data.core.scene import Lane
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.roads import opendrive, opendrive_lanes
 
-VERSION = 13
+VERSION = 14
 """Increased whenever the same files are imported as different geometry."""
 ROADS_VERSION = 4
 """The same for road networks."""
@@ -112,7 +117,9 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         entry = entry.model_copy(update={"origin": "center"})
     else:
         looks, collides, images, up, remarks = _read_geometry(folder, entry)
-    decoded = _decode_all(images, place)
+    # Readers of glTF, whose images are embedded, too, must ignore profiles.
+    colors = _color_images(looks) if entry.file.lower().endswith(usd.ARCHIVE) else frozenset()
+    decoded = _decode_all(images, place, colors)
 
     def image(name: str) -> UInt8:
         if name in decoded:
@@ -300,10 +307,21 @@ def _read_piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
         return stage.source(pieces)
 
 
-def _decode_all(images: Mapping[str, bytes], place: str) -> dict[str, UInt8]:
+def _decode_all(
+    images: Mapping[str, bytes], place: str, colors: Set[str] = frozenset()
+) -> dict[str, UInt8]:
+    """Decode images; colours become sRGB."""
     return {
-        name: decode_image(data, f"{place}#{name}", alpha=True) for name, data in images.items()
+        name: decode_image(data, f"{place}#{name}", alpha=True, color=name in colors)
+        for name, data in images.items()
     }
+
+
+def _color_images(soups: Iterable[TriangleSoup]) -> frozenset[str]:
+    """Names of the images that are colours."""
+    names = {slot.material.texture for soup in soups for slot in soup.slots} - {""}
+    maps = [find_maps(name) or TextureMaps(albedo=name) for name in names]
+    return frozenset(image for one in maps for image in (one.albedo, one.emission))
 
 
 def _geometry_key(placed: tuple[Shape, SE3]) -> tuple[object, ...]:

@@ -93,10 +93,13 @@ def parse_image(root: Path, digests: Digests, name: str, channels: str) -> Array
     return _checked(folder, digests, {channels: pixels})
 
 
-def parse_image_remarks(root: Path, digests: Digests, names: tuple[str, ...]) -> Arrays:
-    """List the unused contents of images, for ``unpack_value``."""
+def parse_image_remarks(root: Path, digests: Digests, images: Mapping[str, str]) -> Arrays:
+    """List the unused contents of images, ``{name: channels}``, for ``unpack_value``."""
     folder = Folder(root)
-    found = [importer.FileRemarks(name, image_remarks(folder.read(name))) for name in names]
+    found = [
+        importer.FileRemarks(name, image_remarks(folder.read(name), color=channels != "stored"))
+        for name, channels in images.items()
+    ]
     return _checked(folder, digests, _pack_value([one for one in found if one.unused]))
 
 

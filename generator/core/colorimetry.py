@@ -4,6 +4,7 @@ Sources: ITU-R BT.709-6, 2015 (luminance); IEC 61966-2-1:1999, the standard of s
 function; both matrices with the four digits that it prints, which undo one another to within 1e-3).
 """
 
+from collections.abc import Sequence
 from typing import Any, TypeVar, overload
 
 import numpy as np
@@ -29,7 +30,21 @@ REC709_FROM_XYZ: Array = np.array(
 )
 """Linear RGB of CIE 1931 XYZ (white D65, Y 1): ``rgb = REC709_FROM_XYZ @ xyz``."""
 
-for _constant in (REC709_LUMINANCE, XYZ_FROM_REC709, REC709_FROM_XYZ):
+REC709_CHROMATICITIES: Array = np.array([0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290])
+"""CIE 1931 x and y of red, green, blue and white."""
+
+_CONES_FROM_XYZ: Array = np.array(
+    [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
+)
+"""Bradford's matrix: Lam, doctoral thesis, University of Bradford, 1985."""
+
+for _constant in (
+    REC709_CHROMATICITIES,
+    _CONES_FROM_XYZ,
+    REC709_LUMINANCE,
+    XYZ_FROM_REC709,
+    REC709_FROM_XYZ,
+):
     _constant.setflags(write=False)
 
 _RED, _GREEN, _BLUE = (float(weight) for weight in REC709_LUMINANCE)
@@ -43,6 +58,30 @@ def luminance(rgb: NDArray[Real]) -> NDArray[Real]:
     # matrix product, added up in the same order on every processor.
     total: NDArray[Real] = rgb[..., 0] * _RED + rgb[..., 1] * _GREEN + rgb[..., 2] * _BLUE
     return total
+
+
+def rec709_from_primaries(chromaticities: Sequence[float]) -> Array:
+    """Matrix [3, 3] from linear RGB of other primaries to Rec. 709, white to white.
+
+    Args:
+        chromaticities: CIE 1931 x and y of red, green, blue and white.
+
+    Sources: SMPTE RP 177:1993 (primaries); ICC.1:2022, annex E (adaptation by Bradford's matrix).
+    """
+    columns, white = _primaries(chromaticities)
+    own_columns, own_white = _primaries(REC709_CHROMATICITIES)
+    gains = (_CONES_FROM_XYZ @ own_white) / (_CONES_FROM_XYZ @ white)
+    adapted = np.linalg.solve(_CONES_FROM_XYZ, gains[:, None] * (_CONES_FROM_XYZ @ columns))
+    matrix: Array = np.linalg.solve(own_columns, adapted)
+    return matrix
+
+
+def _primaries(chromaticities: Sequence[float] | Array) -> tuple[Array, Array]:
+    """XYZ of full red, green and blue as columns [3, 3], and of white [3], whose Y is 1."""
+    x, y = np.reshape(np.asarray(chromaticities, np.float64), (4, 2)).T
+    xyz = np.stack([x, y, 1.0 - x - y])
+    white = xyz[:, 3] / xyz[1, 3]
+    return xyz[:, :3] * np.linalg.solve(xyz[:, :3], white), white
 
 
 def srgb_encode(linear: NDArray[Real]) -> NDArray[Real]:

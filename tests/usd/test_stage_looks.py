@@ -4,13 +4,15 @@ import io
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
 
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.folder_index import MeshEntry
 from gen_data.assets.importer import import_object
+from gen_data.assets.library import open_library
 from gen_data.assets.readers import MeshSource, read_mesh
 from gen_data.assets.texture_maps import find_maps
 from gen_data.assets.usd_stages import stage_model
@@ -193,12 +195,22 @@ def linear(texel: int) -> float:
 
 
 def textured(
-    folder: Path, key: str, output: str, kind: Sdf.ValueTypeName, **inputs: object
+    folder: Path,
+    key: str,
+    output: str,
+    kind: Sdf.ValueTypeName,
+    file: str = "a.png",
+    **inputs: object,
 ) -> MeshSource:
     """Quads with a material whose input comes from an image with two halves."""
     pixels = np.full((8, 8, 3), LIGHT, np.uint8)
     pixels[:, 4:] = DARK
-    Image.fromarray(pixels).save(folder / "a.png")
+    if file.endswith("exr"):
+        channels = {name: np.float32([[linear(v) for v in row] for row in pixels[..., 0]])
+                    for name in "RGB"}  # fmt: skip
+        OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(folder / file))
+    else:
+        Image.fromarray(pixels).save(folder / file)
     stage = new_stage(folder)
     mesh = add_quads(stage)
     coordinates = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
@@ -207,7 +219,7 @@ def textured(
     coordinates.Set([(0, 0), (0.5, 0), (1, 0), (0, 1), (0.5, 1), (1, 1)])
     image = UsdShade.Shader.Define(stage, "/W/Image")
     image.CreateIdAttr("UsdUVTexture")
-    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set("a.png")
+    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(file)
     for name, value in inputs.items():
         of = Sdf.ValueTypeNames.Token if name == "sourceColorSpace" else Sdf.ValueTypeNames.Float4
         image.CreateInput(name, of).Set(value)
@@ -254,6 +266,26 @@ def test_an_image_of_linear_colours_is_read_as_such(tmp_path: Path) -> None:
     same = textured(tmp_path, "diffuseColor", "rgb", kind, sourceColorSpace="sRGB")
     assert not same.images
     assert [slot.material.texture for slot in same.soup.slots] == ["a.png"]
+
+
+def test_colours_of_openexr_images_are_linear_also_in_archives(tmp_path: Path) -> None:
+    """As texels of sRGB: inverted by scale and bias, next to a layer, and in a usdz."""
+    kind = Sdf.ValueTypeNames.Color3f
+    inverse = {"scale": (-1, -1, -1, 1), "bias": (1, 1, 1, 0)}
+    inverted = textured(tmp_path, "diffuseColor", "rgb", kind, "a.exr", **inverse)
+    for row, texel in zip(texels(inverted), (LIGHT, DARK), strict=True):
+        assert linear(row[0]) == pytest.approx(1.0 - linear(texel), abs=0.005)
+    (tmp_path / "props").mkdir()
+    textured(tmp_path, "diffuseColor", "rgb", kind, "a.exr")
+    assert UsdUtils.CreateNewUsdzPackage(
+        str(tmp_path / "a.usda"), str(tmp_path / "props/packed.usdz")
+    )
+    textured(tmp_path / "props", "diffuseColor", "rgb", kind, "a.exr")
+    library = open_library((tmp_path / "props",), tmp_path / "cache", tmp_path / "no packs")
+    for name in ("user/a.usda", "user/packed"):
+        (texture,) = (m.texture for m in library.mesh(name).materials if m.texture)
+        row = library.texture(texture).albedo[4, :, 0].tolist()
+        assert row == [LIGHT] * 4 + [DARK] * 4
 
 
 def test_an_image_of_normals_with_y_downwards_is_turned(tmp_path: Path) -> None:

@@ -143,7 +143,9 @@ class StageFile:
         else:
             texels = np.stack([self._pixels((path, k)) for k in range(3)], axis=-1) / 255.0
             is_color = key != "normal"
-            stored = transfer.space == "sRGB" or (is_color and transfer.space == "auto")
+            is_linear = file.lower().endswith(".exr")
+            auto = is_color and transfer.space == "auto" and not is_linear
+            stored = transfer.space == "sRGB" or auto
             linear = colorimetry.srgb_decode(texels) if stored else texels
             values = linear * np.array(transfer.scale[:3]) + np.array(transfer.bias[:3])
             values = np.clip(values if is_color else 0.5 * (values + 1.0), 0.0, 1.0)
