@@ -7,7 +7,7 @@ Triangles are read with colours, instances, skins and morph targets at rest, and
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 from urllib.parse import unquote
 
@@ -100,7 +100,7 @@ def read_gltf_bytes(folder: Folder, relative: str, data: bytes, materials: bool)
     try:
         document = parse_document(folder, relative, data)
 
-        @cache
+        @lru_cache(MAX_PARTS)
         def find_look(number: int | None) -> _Look:
             """Look of a material that triangles have: unused ones may have any fault."""
             if number is None or not materials:
