@@ -37,6 +37,10 @@ class ByName(Mapping[str, T], Generic[T]):
             )
         return self._values[name]
 
+    def __contains__(self, name: object) -> bool:
+        """Whether there is such a name; decodes nothing."""
+        return name in self._values
+
     def __iter__(self) -> Iterator[str]:
         """The names, in order."""
         return iter(self._values)

@@ -153,6 +153,16 @@ def test_all_that_was_made_is_read(data: gen_data.Dataset, stored: gen_data.Stor
     assert pickle.loads(pickle.dumps(stored))[2].boxes2d["color"] == stored[2].boxes2d["color"]
 
 
+def test_asking_for_a_channel_decodes_no_image(
+    stored: gen_data.StoredDataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    channels = stored[0].cameras["color"].channels
+    monkeypatch.setattr("gen_data.exporters.image_files.read_image", None)
+    assert "rgb" in channels and "flow" not in channels
+    with pytest.raises(TypeError):
+        channels["rgb"]
+
+
 def test_an_unfinished_folder_cannot_be_opened(tmp_path: Path) -> None:
     with pytest.raises(gen_data.StorageError, match=r"plan\.json: missing"):
         gen_data.open(tmp_path)
