@@ -321,15 +321,21 @@ def test_unread_content_is_named_and_unknown_ones_refused(builder: Builder, tmp_
     }
     builder.tree["extensionsUsed"] = list(builder.tree["extensions"])
     builder.primitive["targets"] = [{"POSITION": 0}]
-    builder.tree["meshes"][0]["primitives"].append({"attributes": builder.attributes, "mode": 1})
+    further = [{"attributes": builder.attributes, "mode": 1}, {"attributes": {}}]
+    builder.tree["meshes"][0]["primitives"] += further
+    builder.attributes["TEXCOORD_0"] = builder.accessor(UVS)
+    builder.textured(tmp_path)
+    builder.tree["textures"] = [{}]
     assert builder.read(tmp_path).remarks == (
         "1 animations are not used: it is read at rest",
         "1 cameras are not used",
         "2 lights are not used",
         "1 variants of materials are not used: the default ones are read",
         "1 further scenes are not read",
+        "textures without an image are not used",
         "morph targets of weight 0 are not used",
         "lines and points are not read",
+        "primitives without positions are not read",
     )
     builder.tree["accessors"][0]["componentType"] = 9999
     with pytest.raises(AssetError, match="accessor 0 has the unknown componentType 9999"):

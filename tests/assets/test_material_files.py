@@ -171,6 +171,29 @@ def test_gltf_scales_of_normals_and_occlusion_apply(folder: Path) -> None:
     np.testing.assert_array_equal(texture.occlusion, checker(205, 255))
 
 
+def test_an_even_gltf_occlusion_darkens_everywhere(folder: Path) -> None:
+    gltf(folder, {"occlusionTexture": {"index": 0}}, shade=np.full((4, 4, 3), 128, np.uint8))
+    _, texture = loaded(folder)
+    assert texture is not None
+    np.testing.assert_array_equal(texture.occlusion, np.full((4, 4), 128, np.uint8))
+
+
+def test_unlit_gltf_materials_are_matte_and_have_their_base_colour_only(folder: Path) -> None:
+    """KHR_materials_unlit ignores all other properties; without factors it would be a metal."""
+    colour, other = np.dstack([checker(10, 240)] * 3), np.dstack([checker(0, 255)] * 3)
+    gltf(folder, {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0},
+                                           "metallicRoughnessTexture": {"index": 1}},
+                  "normalTexture": {"index": 1}, "emissiveFactor": [1, 1, 1],
+                  "extensions": {"KHR_materials_unlit": {}}},
+         colour=colour, other=other)  # fmt: skip
+    material, texture = loaded(folder)
+    assert texture is not None
+    np.testing.assert_array_equal(texture.albedo, colour)
+    assert (texture.normal, texture.roughness, texture.metallic) == (None, None, None)
+    assert (material.metallic, material.roughness) == (0.0, 1.0)
+    assert material.emission_cd_m2 == (0.0, 0.0, 0.0)
+
+
 def test_even_images_become_numbers(folder: Path) -> None:
     """A roughness image of 128 and a metal image of 255 are factors, not maps."""
     even = np.zeros((4, 4, 3), np.uint8)

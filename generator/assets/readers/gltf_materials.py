@@ -46,11 +46,13 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> asset_types
         ValueError: if a value is out of range; the message names it.
     """
     further = description.get("extensions", {})
+    _name_unused(further, images)
+    if "KHR_materials_unlit" in further:
+        description, further = _as_matte(description), {}
     glossy = further.get("KHR_materials_pbrSpecularGlossiness")
     pbr = description.get("pbrMetallicRoughness", {})
     if glossy is not None:
         pbr = _specular_glossiness(glossy, images)
-    _name_unused(further, images)
     cover, cutoff, opacity = _read_alpha(description, pbr, images)
     surface = _image_name(pbr, "metallicRoughnessTexture", images)
     roughness, roughness_map = _read_channel(pbr, "roughnessFactor", surface, 1, images)
@@ -108,7 +110,7 @@ _UNUSED = {
     "KHR_materials_dispersion": "is not used",
     "KHR_materials_iridescence": "is not used",
     "KHR_materials_sheen": "is not used",
-    "KHR_materials_unlit": "is not used: it is lit like other surfaces",
+    "KHR_materials_unlit": "is not used: it is lit like other matte surfaces",
 }
 """Extensions of materials that have no equivalent here."""
 _REFLECTED_MAX = 0.08
@@ -125,6 +127,14 @@ def _name_unused(further: Mapping[str, Any], images: Images) -> None:
     volume = further.get("KHR_materials_volume", {})
     if "attenuationDistance" in volume and min(volume.get("attenuationColor", (1.0,))) < 1.0:
         images.remark("attenuationColor is not used")
+
+
+def _as_matte(description: Mapping[str, Any]) -> dict[str, Any]:
+    """A material with the properties that an unlit one has: base colour and alpha."""
+    pbr = description.get("pbrMetallicRoughness", {})
+    kept = {key: pbr[key] for key in ("baseColorFactor", "baseColorTexture") if key in pbr}
+    alpha = {key: description[key] for key in ("alphaMode", "alphaCutoff") if key in description}
+    return {**alpha, "pbrMetallicRoughness": {**kept, "metallicFactor": 0.0}}
 
 
 def _read_reflection(further: Mapping[str, Any], images: Images) -> tuple[float, list[float]]:
@@ -297,7 +307,10 @@ def _read_occlusion(description: Mapping[str, Any], images: Images) -> tuple[str
     name = _image_name(description, "occlusionTexture", images)
     strength = description.get("occlusionTexture", {}).get("strength", 1.0)
     share = fraction(strength, "strength of occlusionTexture")
-    applies = name and share > 0.0 and float(images.pixels(name)[..., 0].std()) >= EVEN
+    if not name or share == 0.0:
+        return "", 1.0
+    levels = images.pixels(name)[..., 0]
+    applies = float(levels.std()) >= EVEN or float(levels.mean()) <= 255.0 - EVEN
     return (f"{name}!0", share) if applies else ("", 1.0)
 
 
