@@ -188,22 +188,26 @@ def test_webp_images_and_hidden_nodes(builder: Builder, tmp_path: Path) -> None:
     ("content", "expected"),
     [
         ({"diffuseFactor": [0.5, 0.2, 0.1, 1], "specularFactor": [0.04] * 3,
-          "glossinessFactor": 0.25}, ((0.5, 0.2, 0.1), 0.75, 0.0)),
+          "glossinessFactor": 0.25}, ((0.5, 0.2, 0.1), 0.75, 0.0, 0.5)),
+        # Without reflection.
+        ({"diffuseFactor": [0.5, 0.2, 0.1, 1], "specularFactor": [0, 0, 0],
+          "glossinessFactor": 0.0}, ((0.5, 0.2, 0.1), 1.0, 0.0, 0.0)),
         # Black, with the reflection of gold: a metal of that colour.
         ({"diffuseFactor": [0, 0, 0, 1], "specularFactor": [1.0, 0.77, 0.34],
-          "glossinessFactor": 1.0}, ((1.0, 0.77, 0.34), 0.0, 1.0)),
+          "glossinessFactor": 1.0}, ((1.0, 0.77, 0.34), 0.0, 1.0, 1.0)),
     ],
-    ids=["plastic", "gold"],
+    ids=["plastic", "cloth", "gold"],
 )  # fmt: skip
 def test_specular_glossiness(
     builder: Builder, tmp_path: Path, content: dict[str, Any],
-    expected: tuple[tuple[float, float, float], float, float],
+    expected: tuple[tuple[float, float, float], float, float, float],
 ) -> None:  # fmt: skip
-    """Colour, roughness and metalness that look the same."""
+    """Colour, roughness, metalness and reflectance that look the same."""
     builder.material(extensions={"KHR_materials_pbrSpecularGlossiness": content})
     builder.tree["extensionsRequired"] = ["KHR_materials_pbrSpecularGlossiness"]
     material = builder.read(tmp_path).soup.slots[0].material
-    assert (material.base_color, material.roughness, material.metallic) == expected
+    found = (material.base_color, material.roughness, material.metallic, material.specular)
+    assert found == expected
 
 
 @pytest.mark.parametrize(

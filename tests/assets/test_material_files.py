@@ -171,6 +171,17 @@ def test_gltf_scales_of_normals_and_occlusion_apply(folder: Path) -> None:
     np.testing.assert_array_equal(texture.occlusion, checker(205, 255))
 
 
+def test_a_metal_of_specular_glossiness_keeps_its_holes(folder: Path) -> None:
+    """Black with the reflection of gold, and holes in the image of its diffuse colour."""
+    mesh = np.dstack([np.zeros((4, 4, 3), np.uint8), checker(0, 255)])
+    content = {"diffuseTexture": {"index": 0}, "specularFactor": [1, 0.77, 0.34]}
+    gltf(folder, {"alphaMode": "MASK", **_extension("pbrSpecularGlossiness", **content)}, mesh=mesh)
+    material, texture = loaded(folder)
+    assert (material.metallic, material.base_color) == (1.0, (1.0, 0.77, 0.34))
+    assert texture is not None and texture.alpha is not None
+    np.testing.assert_array_equal(texture.alpha >= 128, mesh[..., 3] > 0)
+
+
 def test_an_even_gltf_occlusion_darkens_everywhere(folder: Path) -> None:
     gltf(folder, {"occlusionTexture": {"index": 0}}, shade=np.full((4, 4, 3), 128, np.uint8))
     _, texture = loaded(folder)
@@ -239,11 +250,12 @@ def _extension(name: str, **content: Any) -> dict[str, Any]:
       "diffuseTransmissionColorTexture counts by its mean"),
      (_extension("volume", thicknessFactor=1, attenuationDistance=1, attenuationColor=[1, 0, 0]),
       "attenuationColor is not used"),
-     (_extension("pbrSpecularGlossiness", specularGlossinessTexture={"index": 0}),
+     (_extension("pbrSpecularGlossiness", diffuseFactor=[0, 0, 0, 1],
+                 specularGlossinessTexture={"index": 0}),
       "specularGlossinessTexture counts by its mean"),
      (_extension("specular", specularTexture={"index": 0}), "specularTexture counts by its mean"),
      (_extension("specular", specularColorFactor=[1, 0.5, 0.5]),
-      "the colour of its reflection (KHR_materials_specular) is not used"),
+      "the colour of its reflection is not used"),
      (_extension("ior", ior=3), "its reflectance of 25% counts as 8%")],
 )  # fmt: skip
 def test_properties_of_gltf_materials_that_are_not_used_as_they_are_have_a_remark(
