@@ -40,7 +40,7 @@ from gen_data.core.scene import Lane
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.roads import opendrive, opendrive_lanes
 
-VERSION = 14
+VERSION = 15
 """Increased whenever the same files are imported as different geometry."""
 ROADS_VERSION = 4
 """The same for road networks."""

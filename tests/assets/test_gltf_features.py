@@ -188,22 +188,26 @@ def test_webp_images_and_hidden_nodes(builder: Builder, tmp_path: Path) -> None:
     ("content", "expected"),
     [
         ({"diffuseFactor": [0.5, 0.2, 0.1, 1], "specularFactor": [0.04] * 3,
-          "glossinessFactor": 0.25}, ((0.5, 0.2, 0.1), 0.75, 0.0)),
+          "glossinessFactor": 0.25}, ((0.5, 0.2, 0.1), 0.75, 0.0, 0.5)),
+        # Without reflection.
+        ({"diffuseFactor": [0.5, 0.2, 0.1, 1], "specularFactor": [0, 0, 0],
+          "glossinessFactor": 0.0}, ((0.5, 0.2, 0.1), 1.0, 0.0, 0.0)),
         # Black, with the reflection of gold: a metal of that colour.
         ({"diffuseFactor": [0, 0, 0, 1], "specularFactor": [1.0, 0.77, 0.34],
-          "glossinessFactor": 1.0}, ((1.0, 0.77, 0.34), 0.0, 1.0)),
+          "glossinessFactor": 1.0}, ((1.0, 0.77, 0.34), 0.0, 1.0, 1.0)),
     ],
-    ids=["plastic", "gold"],
+    ids=["plastic", "cloth", "gold"],
 )  # fmt: skip
 def test_specular_glossiness(
     builder: Builder, tmp_path: Path, content: dict[str, Any],
-    expected: tuple[tuple[float, float, float], float, float],
+    expected: tuple[tuple[float, float, float], float, float, float],
 ) -> None:  # fmt: skip
-    """Colour, roughness and metalness that look the same."""
+    """Colour, roughness, metalness and reflectance that look the same."""
     builder.material(extensions={"KHR_materials_pbrSpecularGlossiness": content})
     builder.tree["extensionsRequired"] = ["KHR_materials_pbrSpecularGlossiness"]
     material = builder.read(tmp_path).soup.slots[0].material
-    assert (material.base_color, material.roughness, material.metallic) == expected
+    found = (material.base_color, material.roughness, material.metallic, material.specular)
+    assert found == expected
 
 
 @pytest.mark.parametrize(
@@ -321,15 +325,21 @@ def test_unread_content_is_named_and_unknown_ones_refused(builder: Builder, tmp_
     }
     builder.tree["extensionsUsed"] = list(builder.tree["extensions"])
     builder.primitive["targets"] = [{"POSITION": 0}]
-    builder.tree["meshes"][0]["primitives"].append({"attributes": builder.attributes, "mode": 1})
+    further = [{"attributes": builder.attributes, "mode": 1}, {"attributes": {}}]
+    builder.tree["meshes"][0]["primitives"] += further
+    builder.attributes["TEXCOORD_0"] = builder.accessor(UVS)
+    builder.textured(tmp_path)
+    builder.tree["textures"] = [{}]
     assert builder.read(tmp_path).remarks == (
         "1 animations are not used: it is read at rest",
         "1 cameras are not used",
         "2 lights are not used",
         "1 variants of materials are not used: the default ones are read",
         "1 further scenes are not read",
+        "textures without an image are not used",
         "morph targets of weight 0 are not used",
         "lines and points are not read",
+        "primitives without positions are not read",
     )
     builder.tree["accessors"][0]["componentType"] = 9999
     with pytest.raises(AssetError, match="accessor 0 has the unknown componentType 9999"):

@@ -171,6 +171,40 @@ def test_gltf_scales_of_normals_and_occlusion_apply(folder: Path) -> None:
     np.testing.assert_array_equal(texture.occlusion, checker(205, 255))
 
 
+def test_a_metal_of_specular_glossiness_keeps_its_holes(folder: Path) -> None:
+    """Black with the reflection of gold, and holes in the image of its diffuse colour."""
+    mesh = np.dstack([np.zeros((4, 4, 3), np.uint8), checker(0, 255)])
+    content = {"diffuseTexture": {"index": 0}, "specularFactor": [1, 0.77, 0.34]}
+    gltf(folder, {"alphaMode": "MASK", **_extension("pbrSpecularGlossiness", **content)}, mesh=mesh)
+    material, texture = loaded(folder)
+    assert (material.metallic, material.base_color) == (1.0, (1.0, 0.77, 0.34))
+    assert texture is not None and texture.alpha is not None
+    np.testing.assert_array_equal(texture.alpha >= 128, mesh[..., 3] > 0)
+
+
+def test_an_even_gltf_occlusion_darkens_everywhere(folder: Path) -> None:
+    gltf(folder, {"occlusionTexture": {"index": 0}}, shade=np.full((4, 4, 3), 128, np.uint8))
+    _, texture = loaded(folder)
+    assert texture is not None
+    np.testing.assert_array_equal(texture.occlusion, np.full((4, 4), 128, np.uint8))
+
+
+def test_unlit_gltf_materials_are_matte_and_have_their_base_colour_only(folder: Path) -> None:
+    """KHR_materials_unlit ignores all other properties; without factors it would be a metal."""
+    colour, other = np.dstack([checker(10, 240)] * 3), np.dstack([checker(0, 255)] * 3)
+    gltf(folder, {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0},
+                                           "metallicRoughnessTexture": {"index": 1}},
+                  "normalTexture": {"index": 1}, "emissiveFactor": [1, 1, 1],
+                  "extensions": {"KHR_materials_unlit": {}}},
+         colour=colour, other=other)  # fmt: skip
+    material, texture = loaded(folder)
+    assert texture is not None
+    np.testing.assert_array_equal(texture.albedo, colour)
+    assert (texture.normal, texture.roughness, texture.metallic) == (None, None, None)
+    assert (material.metallic, material.roughness) == (0.0, 1.0)
+    assert material.emission_cd_m2 == (0.0, 0.0, 0.0)
+
+
 def test_even_images_become_numbers(folder: Path) -> None:
     """A roughness image of 128 and a metal image of 255 are factors, not maps."""
     even = np.zeros((4, 4, 3), np.uint8)
@@ -216,11 +250,12 @@ def _extension(name: str, **content: Any) -> dict[str, Any]:
       "diffuseTransmissionColorTexture counts by its mean"),
      (_extension("volume", thicknessFactor=1, attenuationDistance=1, attenuationColor=[1, 0, 0]),
       "attenuationColor is not used"),
-     (_extension("pbrSpecularGlossiness", specularGlossinessTexture={"index": 0}),
+     (_extension("pbrSpecularGlossiness", diffuseFactor=[0, 0, 0, 1],
+                 specularGlossinessTexture={"index": 0}),
       "specularGlossinessTexture counts by its mean"),
      (_extension("specular", specularTexture={"index": 0}), "specularTexture counts by its mean"),
      (_extension("specular", specularColorFactor=[1, 0.5, 0.5]),
-      "the colour of its reflection (KHR_materials_specular) is not used"),
+      "the colour of its reflection is not used"),
      (_extension("ior", ior=3), "its reflectance of 25% counts as 8%")],
 )  # fmt: skip
 def test_properties_of_gltf_materials_that_are_not_used_as_they_are_have_a_remark(

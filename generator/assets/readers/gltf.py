@@ -134,6 +134,9 @@ def _read_primitives(
         if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
             document.remarks.append("lines and points are not read")
             continue
+        if "POSITION" not in primitive["attributes"]:
+            document.remarks.append("primitives without positions are not read")
+            continue
         look = find_look(primitive.get("material"))
         soup = _read_primitive(document, primitive, look, placed)
         soup = replace(soup, group_names=(placed.name,))
@@ -380,6 +383,9 @@ def _image_name(document: Document, reference: Mapping[str, Any]) -> str:
         number = further.get("EXT_texture_webp", {}).get("source")
         if number is None and further:
             raise unsupported_extension(document.folder, document.relative, next(iter(further)))
+        if number is None:
+            document.remarks.append("textures without an image are not used")
+            return ""
     image = document.item("images", number, "image")
     if "uri" in image and not image["uri"].startswith("data:"):
         uri = unquote(image["uri"])

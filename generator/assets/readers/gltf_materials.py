@@ -46,23 +46,24 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> asset_types
         ValueError: if a value is out of range; the message names it.
     """
     further = description.get("extensions", {})
-    glossy = further.get("KHR_materials_pbrSpecularGlossiness")
-    pbr = description.get("pbrMetallicRoughness", {})
-    if glossy is not None:
-        pbr = _specular_glossiness(glossy, images)
     _name_unused(further, images)
+    if "KHR_materials_unlit" in further:
+        description, further = _as_matte(description), {}
+    glossy = further.get("KHR_materials_pbrSpecularGlossiness")
+    if glossy is None:
+        pbr = description.get("pbrMetallicRoughness", {})
+        ior, reflected = _read_reflection(further, images)
+    else:
+        ior, (pbr, reflected) = 1.5, _read_glossy(glossy, images)
     cover, cutoff, opacity = _read_alpha(description, pbr, images)
     surface = _image_name(pbr, "metallicRoughnessTexture", images)
     roughness, roughness_map = _read_channel(pbr, "roughnessFactor", surface, 1, images)
     metallic, metallic_map = _read_channel(pbr, "metallicFactor", surface, 2, images)
     clear = further.get("KHR_materials_transmission", {})
     transmission = _read_factor(clear, "transmission", 0.0, 0, images)
-    ior, reflected = _read_reflection(further, images)
-    if metallic == 0.0 == transmission and max(reflected) > _REFLECTED_MAX:
-        kept = {_GLOSSY[key]: value for key, value in pbr.items() if key in _GLOSSY}
-        converted = _specular_glossiness({**kept, "specularFactor": reflected}, images)
-        if converted["metallicFactor"] > 0.0:
-            pbr, metallic = converted, 1.0
+    if metallic == 0.0 == transmission and _looks_metallic(pbr, reflected, images):
+        # A metal: it has the colour of its reflection.
+        pbr, metallic = {"baseColorFactor": [*reflected, 1.0]}, 1.0
     *color, _ = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
     passed, transmitted = _read_diffuse_transmission(further, pbr, images)
     # Light that a thin sheet transmits is missing in its reflection.
@@ -108,13 +109,11 @@ _UNUSED = {
     "KHR_materials_dispersion": "is not used",
     "KHR_materials_iridescence": "is not used",
     "KHR_materials_sheen": "is not used",
-    "KHR_materials_unlit": "is not used: it is lit like other surfaces",
+    "KHR_materials_unlit": "is not used: it is lit like other matte surfaces",
 }
 """Extensions of materials that have no equivalent here."""
 _REFLECTED_MAX = 0.08
 """Largest reflectance of a dielectric at normal incidence that a material states."""
-_GLOSSY = {"baseColorFactor": "diffuseFactor", "baseColorTexture": "diffuseTexture"}
-"""Names of a dielectric's colour in KHR_materials_pbrSpecularGlossiness."""
 
 
 def _name_unused(further: Mapping[str, Any], images: Images) -> None:
@@ -125,6 +124,14 @@ def _name_unused(further: Mapping[str, Any], images: Images) -> None:
     volume = further.get("KHR_materials_volume", {})
     if "attenuationDistance" in volume and min(volume.get("attenuationColor", (1.0,))) < 1.0:
         images.remark("attenuationColor is not used")
+
+
+def _as_matte(description: Mapping[str, Any]) -> dict[str, Any]:
+    """A material with the properties that an unlit one has: base colour and alpha."""
+    pbr = description.get("pbrMetallicRoughness", {})
+    kept = {key: pbr[key] for key in ("baseColorFactor", "baseColorTexture") if key in pbr}
+    alpha = {key: description[key] for key in ("alphaMode", "alphaCutoff") if key in description}
+    return {**alpha, "pbrMetallicRoughness": {**kept, "metallicFactor": 0.0}}
 
 
 def _read_reflection(further: Mapping[str, Any], images: Images) -> tuple[float, list[float]]:
@@ -152,37 +159,39 @@ def _read_reflection(further: Mapping[str, Any], images: Images) -> tuple[float,
 def _name_reflection(reflected: Sequence[float], transmission: float, images: Images) -> None:
     """Name properties that ``Material.specular`` lacks; glass reflects by its ``ior``."""
     if max(reflected) - min(reflected) > 0.01 * max(reflected):
-        images.remark("the colour of its reflection (KHR_materials_specular) is not used")
+        images.remark("the colour of its reflection is not used")
     if transmission == 0.0 and max(reflected) > 1.01 * _REFLECTED_MAX:
         images.remark(f"its reflectance of {max(reflected):.0%} counts as {_REFLECTED_MAX:.0%}")
 
 
-def _specular_glossiness(glossy: Mapping[str, Any], images: Images) -> dict[str, Any]:
-    """The pbrMetallicRoughness that looks like a pbrSpecularGlossiness.
+def _read_glossy(glossy: Mapping[str, Any], images: Images) -> tuple[dict[str, Any], list[float]]:
+    """The pbrMetallicRoughness of KHR_materials_pbrSpecularGlossiness, and its reflectance."""
+    specular = [fraction(c, "specularFactor") for c in glossy.get("specularFactor", (1.0,) * 3)]
+    gloss = fraction(glossy.get("glossinessFactor", 1.0), "glossinessFactor")
+    mean = _read_mean_color(glossy, "specularGlossinessTexture", images)
+    gloss *= _read_mean(glossy, "specularGlossinessTexture", 3, images)
+    described = {
+        "baseColorFactor": glossy.get("diffuseFactor", (1.0,) * 4),
+        "metallicFactor": 0.0,
+        "roughnessFactor": round(1.0 - gloss, 4),
+    }
+    if "diffuseTexture" in glossy:
+        described["baseColorTexture"] = glossy["diffuseTexture"]
+    return described, [a * b for a, b in zip(specular, mean, strict=True)]
+
+
+def _looks_metallic(pbr: Mapping[str, Any], reflected: Sequence[float], images: Images) -> bool:
+    """Whether a metal looks more like a surface of this base colour and reflectance.
 
     Source: Khronos, KHR_materials_pbrSpecularGlossiness, "convert between workflows": the metalness
     solves the equality of brightness; images enter by their means.
     """
-    diffuse = [float(c) for c in glossy.get("diffuseFactor", (1.0, 1.0, 1.0, 1.0))]
-    specular = [fraction(c, "specularFactor") for c in glossy.get("specularFactor", (1.0,) * 3)]
-    gloss = fraction(glossy.get("glossinessFactor", 1.0), "glossinessFactor")
-    mean = _read_mean_color(glossy, "specularGlossinessTexture", images)
-    specular = [a * b for a, b in zip(specular, mean, strict=True)]
-    gloss *= _read_mean(glossy, "specularGlossinessTexture", 3, images)
-    base = _mean_color(_image_name(glossy, "diffuseTexture", images), images)
-    whole = [a * b for a, b in zip(diffuse[:3], base, strict=True)]
-    metallic = _solve_metallic(_brightness(whole), _brightness(specular), 1.0 - max(specular))
-    described: dict[str, Any] = {
-        "baseColorFactor": diffuse,
-        "metallicFactor": 0.0,
-        "roughnessFactor": round(1.0 - gloss, 4),
-    }
-    if metallic > 0.5:
-        # A metal: it has the colour of its reflection.
-        return {**described, "baseColorFactor": [*specular, diffuse[3]], "metallicFactor": 1.0}
-    if "diffuseTexture" in glossy:
-        described["baseColorTexture"] = glossy["diffuseTexture"]
-    return described
+    if max(reflected) <= _REFLECTED_MAX:
+        return False
+    base = _mean_color(_image_name(pbr, "baseColorTexture", images), images)
+    colors = pbr.get("baseColorFactor", (1.0,) * 4)[:3]
+    whole = [float(a) * b for a, b in zip(colors, base, strict=True)]
+    return _solve_metallic(_brightness(whole), _brightness(reflected), 1.0 - max(reflected)) > 0.5
 
 
 def _brightness(color: Sequence[float]) -> float:
@@ -297,7 +306,10 @@ def _read_occlusion(description: Mapping[str, Any], images: Images) -> tuple[str
     name = _image_name(description, "occlusionTexture", images)
     strength = description.get("occlusionTexture", {}).get("strength", 1.0)
     share = fraction(strength, "strength of occlusionTexture")
-    applies = name and share > 0.0 and float(images.pixels(name)[..., 0].std()) >= EVEN
+    if not name or share == 0.0:
+        return "", 1.0
+    levels = images.pixels(name)[..., 0]
+    applies = float(levels.std()) >= EVEN or float(levels.mean()) <= 255.0 - EVEN
     return (f"{name}!0", share) if applies else ("", 1.0)
 
 
