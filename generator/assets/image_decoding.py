@@ -117,7 +117,10 @@ def image_remarks(data: bytes, *, color: bool = True) -> tuple[str, ...]:
         if data[:4] == _EXR_MAGIC:
             return _exr_remarks(data)
         with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
-            return color_profiles.color_remarks(image) if color else ()
+            found = color_profiles.color_remarks(image) if color else ()
+            # Further images of MPO files are depth, gain or previews of telephones.
+            count = 1 if image.format == "MPO" else getattr(image, "n_frames", 1)
+            return found if count == 1 else (*found, f"of {count} pictures, the first is used")
     return ()
 
 
