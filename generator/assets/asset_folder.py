@@ -139,7 +139,10 @@ def is_pattern(file: str) -> bool:
 
 
 def match_files(pattern: str, files: tuple[str, ...]) -> tuple[str, ...]:
-    """Select files that match a pattern part by part; ``**`` matches any number of folders."""
+    """Select files that match a pattern part by part; ``**`` matches any number of folders.
+
+    Suffixes match in any case: cameras write ``.JPG``.
+    """
     parts = PurePosixPath(pattern).parts
     return tuple(file for file in files if _matches(PurePosixPath(file).parts, parts))
 
@@ -185,7 +188,14 @@ def _matches(parts: tuple[str, ...], patterns: tuple[str, ...]) -> bool:
         return not parts
     if patterns[0] == "**":
         return any(_matches(parts[k:], patterns[1:]) for k in range(len(parts) + 1))
+    if len(parts) == len(patterns) == 1:
+        return fnmatchcase(_lower_suffix(parts[0]), _lower_suffix(patterns[0]))
     return bool(parts) and fnmatchcase(parts[0], patterns[0]) and _matches(parts[1:], patterns[1:])
+
+
+def _lower_suffix(name: str) -> str:
+    stem, dot, suffix = name.rpartition(".")
+    return f"{stem}.{suffix.lower()}" if dot else name
 
 
 def _raise_unreadable(error: OSError) -> None:

@@ -36,9 +36,15 @@ def color_remarks(image: Image.Image) -> tuple[str, ...]:
     _, fault = _find_transform(profile, _base_mode(image))
     if not profile and image.mode == "CMYK":
         fault = "CMYK without a colour profile; its inks count as ideal"
-    elif not profile and image.getexif().get_ifd(_EXIF_IFD).get(_COLOR_SPACE, _SRGB) != _SRGB:
+    elif not profile and _exif_color_space(image) != _SRGB:
         fault = "EXIF states other colours than sRGB, without a profile; they count as sRGB"
     return (fault,) if fault else ()
+
+
+def _exif_color_space(image: Image.Image) -> int:
+    # Without this test, Pillow decodes a whole PNG to look for EXIF data behind its pixels.
+    exif = image.getexif().get_ifd(_EXIF_IFD) if "exif" in image.info else {}
+    return int(exif.get(_COLOR_SPACE, _SRGB))
 
 
 def _base_mode(image: Image.Image) -> str:

@@ -29,6 +29,7 @@ from gen_data.assets.asset_folder import (
     match_files,
     sanitize_word,
 )
+from gen_data.assets.image_decoding import may_be_panorama
 from gen_data.assets.readers import MESH_SUFFIXES
 from gen_data.assets.texture_maps import TextureMaps as Maps
 from gen_data.config.base_model import Strict
@@ -624,7 +625,13 @@ def _index_files(root: Path) -> FolderIndex:
         for name, suffix in suffixes.items()
         if suffix in meshes and (suffix != robot_formats.MJCF_SUFFIX or _is_mjcf(root, name))
     ]
-    panoramas = [name for name, suffix in suffixes.items() if suffix in PANORAMA_SUFFIXES]
+    panoramas = [
+        name
+        for name, suffix in suffixes.items()
+        if suffix in PANORAMA_SUFFIXES
+        # Next to meshes, other OpenEXR files are images of their materials.
+        and (suffix != ".exr" or not files or may_be_panorama(root / name))
+    ]
     used = {
         f
         for name in files

@@ -4,10 +4,11 @@ import contextlib
 import io
 import math
 import re
+import struct
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
@@ -116,7 +117,10 @@ def image_remarks(data: bytes, *, color: bool = True) -> tuple[str, ...]:
         if data[:4] == _EXR_MAGIC:
             return _exr_remarks(data)
         with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
-            return color_profiles.color_remarks(image) if color else ()
+            found = color_profiles.color_remarks(image) if color else ()
+            # Further images of MPO files are depth, gain or previews of telephones.
+            count = 1 if image.format == "MPO" else getattr(image, "n_frames", 1)
+            return found if count == 1 else (*found, f"of {count} pictures, the first is used")
     return ()
 
 
@@ -215,6 +219,25 @@ def read_exr(data: bytes, place: str, *, color: bool = True) -> asset_types.Floa
         if color and "chromaticities" in headers[number]:
             rgb = _to_rec709(rgb, headers[number]["chromaticities"])
     return _in_display_window(rgb, headers[number])
+
+
+def may_be_panorama(path: Path) -> bool:
+    """Whether an OpenEXR file has a window twice as wide as high, by its first header.
+
+    Files that are damaged or cannot be opened may be: their use reports the fault.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(_MAX_EXR_HEADER)
+    except OSError:
+        return True
+    corners = [struct.unpack("<4i", found) for found in _EXR_WINDOW.findall(head)]
+    wide = [x1 - x0 + 1 == 2 * (y1 - y0 + 1) for x0, y0, x1, y1 in corners]
+    return any(wide) or not wide
+
+
+_MAX_EXR_HEADER = 1 << 16
+_EXR_WINDOW = re.compile(rb"(?s)(?:data|display)Window\0box2i\0\x10\0\0\0(.{16})")
 
 
 @contextlib.contextmanager

@@ -4,6 +4,7 @@ Anything else is skipped, and counted with the reason. Folders of label images, 
 of a camera (``depth``, ``instance``), are left out, and so are further links to the same file.
 """
 
+import contextlib
 import math
 import os
 from collections import Counter
@@ -189,22 +190,24 @@ def decode_photo(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]
     """
     import io
 
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     (name,) = files
     path = root / name
-    data = path.read_bytes()
+    data = _read_bytes(path)
     rgb = image_decoding.decode_image(data, str(path), color=True)
     height, width = rgb.shape[:2]
     if min(width, height) < SIDE_MIN_PX:
         raise AssetError(f"{path}: smaller than {SIDE_MIN_PX} px; leave it out")
-    with Image.open(io.BytesIO(data)) as image:
+    steps = np.zeros(0, np.int64)
+    # Pillow opens no TIFF of colours in floating point.
+    with contextlib.suppress(UnidentifiedImageError), Image.open(io.BytesIO(data)) as image:
         if image.mode in ("1", "P", "I", "I;16", "I;16B", "F"):
             raise AssetError(f"{path}: a label or depth image (mode {image.mode}); leave it out")
         if image.mode in ("L", "LA"):
             raise AssetError(f"{path}: without colours; leave it out")
         tables = getattr(image, "quantization", None) or {}
-        steps = np.array(tables[min(tables)] if tables else [], np.int64)
+        steps = np.array(tables[min(tables)] if tables else steps, np.int64)
     size_px = np.array([width, height], np.int64)
     return {
         "rgb": _middle(rgb),
@@ -229,6 +232,13 @@ def read_picture(path: Path) -> tuple[UInt8, tuple[str, ...]]:
     return arrays["rgb"], _remarks(arrays)
 
 
+def _read_bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise AssetError(f"{path}: {error.strerror}") from None
+
+
 def _encode_remarks(data: bytes) -> UInt8:
     return encode_text("\n".join(image_decoding.image_remarks(data)))
 
@@ -241,10 +251,7 @@ def _decode_rgb(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]]
     """Decode an image; runs in the sandbox."""
     (name,) = files
     path = root / name
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise AssetError(f"{path}: {error.strerror}") from None
+    data = _read_bytes(path)
     rgb = image_decoding.decode_image(data, str(path), color=True)
     return {"rgb": rgb, "remarks": _encode_remarks(data)}
 

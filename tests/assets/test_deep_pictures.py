@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gen_data.assets.image_decoding import decode_image, decode_radiance, read_exr
+from gen_data.assets.image_decoding import (
+    decode_image,
+    decode_radiance,
+    image_remarks,
+    read_exr,
+)
 from gen_data.core.errors import AssetError
 
 
@@ -54,6 +59,17 @@ def test_sixteen_bits_become_eight_and_floating_point_counts_to_1() -> None:
     values = np.array([[0.0, 0.5, 1.0, 7.0]], np.float32)
     levels = decode_image(encoded(Image.fromarray(values), "TIFF"), "a")[0, :, 0]
     assert levels.tolist() == [0, 128, 255, 255]
+
+
+@pytest.mark.parametrize(("kind", "remarks"), [("TIFF", 1), ("WEBP", 1), ("PNG", 1), ("MPO", 0)])
+def test_files_of_several_pictures_show_the_first_and_the_others_are_named(
+    kind: str, remarks: int
+) -> None:
+    """Pages and animations; telephones add depth or previews to an MPO file."""
+    first, second = (Image.new("RGB", (8, 8), color) for color in ("red", "blue"))
+    data = encoded(first, kind, save_all=True, append_images=[second])
+    assert decode_image(data, "a")[4, 4].tolist() == pytest.approx((255, 0, 0), abs=5)
+    assert image_remarks(data) == ("of 2 pictures, the first is used",) * remarks
 
 
 def radiance(rows: int, columns: int, resolution: str, image: np.ndarray) -> bytes:

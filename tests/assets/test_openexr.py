@@ -131,3 +131,24 @@ def test_maps_with_values_below_zero_are_refused(tmp_path: Path) -> None:
     data = encoded(tmp_path, part(np.full((2, 2, 3), -0.5)))
     with pytest.raises(AssetError, match=r"n\.exr: has values below 0; save it as PNG"):
         decode_image(data, "n.exr")
+
+
+def test_images_of_meshes_are_no_panoramas_without_an_index(tmp_path: Path) -> None:
+    """Next to a mesh, a square file is a texture; cut panoramas are known by their display."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    square, sky = np.ones((4, 4, 3)), np.ones((2, 4, 3))
+    (folder / "rough.exr").write_bytes(encoded(tmp_path, part(square)))
+    (folder / "sky.exr").write_bytes(encoded(tmp_path, part(sky)))
+    cut = part(square, displayWindow=window(0, 0, 8, 4))
+    (folder / "cut.exr").write_bytes(encoded(tmp_path, cut))
+
+    def skies() -> list[str]:
+        library = open_library((folder,), tmp_path / "cache", tmp_path / "no packs")
+        return [
+            one.asset_id for one in library.find((), "environment") if one.asset_id[:4] == "user"
+        ]
+
+    assert skies() == ["user/cut", "user/rough", "user/sky"]
+    (folder / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert skies() == ["user/cut", "user/sky"]

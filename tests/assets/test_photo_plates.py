@@ -128,6 +128,16 @@ def test_the_estimate_is_reported_with_its_error(tmp_path: Path) -> None:
     assert "hfov 65.0 deg" in finding.note
 
 
+def test_photographs_without_exif_ask_for_the_field_of_view(tmp_path: Path) -> None:
+    """A TIFF in floating point, which Pillow does not open."""
+    library_of(tmp_path, f"horizon: {{height_px: 310}}, ground: {GROUND}")
+    cv2.imwrite(str(tmp_path / "photo.tif"), np.full((640, 960, 3), 0.5, np.float32))
+    index = tmp_path / "assets.yaml"
+    index.write_text(index.read_text().replace("photo.png", "photo.tif"))
+    with pytest.raises(AssetError, match=r"hfov_deg: is unknown, and there is no EXIF focal"):
+        open_library([tmp_path], tmp_path / "cache").plate("user/photo")
+
+
 def test_exif_gives_the_field_of_view(tmp_path: Path) -> None:
     """The 35 mm equivalent has the diagonal angle of view of film, whose diagonal is 43.27 mm."""
     image = Image.fromarray(np.full((640, 960, 3), 120, np.uint8))

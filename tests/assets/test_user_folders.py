@@ -268,7 +268,7 @@ def test_edges_that_do_not_fit_a_file_and_images_without_place_are_refused(folde
 @pytest.mark.slow
 def test_a_pattern_stands_for_every_file_that_matches(folder: Path) -> None:
     """Ids and categories follow from paths; the rest of the entry holds for all."""
-    for name in ("bolts/m8.stl", "bolts/long/m10.stl", "nuts/m8.stl", "nut.stl", ".git/x.stl"):
+    for name in ("bolts/m8.stl", "bolts/long/m10.STL", "nuts/m8.stl", "nut.stl", ".git/x.stl"):
         write_box(folder / name, (10.0, 10.0, 20.0))
     (folder / "assets.yaml").write_text(
         "assets:\n  - {file: bolts/**/*.stl, unit: mm, tags: [metal]}\n"

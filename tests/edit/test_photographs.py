@@ -32,6 +32,13 @@ from gen_data.lab.edit.samples import Studio
 from gen_data.preview.plate_overlay import axes_px, plate_overlay
 
 
+def test_a_dropped_picture_of_a_telephone_is_refused_with_a_remedy(tmp_path: Path) -> None:
+    path = tmp_path / "IMG_1.HEIC"
+    path.write_bytes(b"content")
+    with pytest.raises(AssetError, match=r"IMG_1\.HEIC: HEIC files are not read: save them as JPE"):
+        CheckFile(path).run(Studio())
+
+
 def test_an_entry_has_the_horizon_of_the_tilt() -> None:
     """Fields of 90 degrees have a focal length of half the width: 45 degrees are 400 px up."""
     standpoint = Standpoint(0.6, 45.0, 90.0, rectangle((0.25, 0.75), (0.5, 1.0)))

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
@@ -70,6 +71,22 @@ def test_a_limit_chooses_files_evenly_and_folders_without_any_are_refused(tmp_pa
         StorageError, match=r"holds no photographs \(.*\.png.*\) and no laser scans"
     ):
         real_files.find_files(tmp_path)
+
+
+def test_a_photograph_that_is_gone_is_counted(tmp_path: Path) -> None:
+    """Removed after the folder was listed."""
+    save(tmp_path / "a.png")
+    files, inventory = real_files.find_files(tmp_path), real_files.Inventory()
+    (tmp_path / "a.png").unlink()
+    assert list(real_files.read_photos(files, 9, inventory)) == []
+    assert inventory.skipped == {("photographs", "No such file or directory"): 1}
+
+
+def test_photographs_in_floating_point_are_read(tmp_path: Path) -> None:
+    """A TIFF of three colours, which Pillow does not open; it ended the command."""
+    cv2.imwrite(str(tmp_path / "a.tif"), np.full((80, 96, 3), (0.2, 0.4, 1.0), np.float32))
+    (photo,) = real_files.read_photos(real_files.find_files(tmp_path), 9, real_files.Inventory())
+    assert (photo.rgb[0, 0].tolist(), photo.quantisation) == ([255, 102, 51], None)
 
 
 def test_pictures_and_films_in_other_formats_are_counted_with_a_remedy(tmp_path: Path) -> None:

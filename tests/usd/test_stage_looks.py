@@ -282,7 +282,7 @@ def test_colours_of_openexr_images_are_linear_also_in_archives(tmp_path: Path) -
     )
     textured(tmp_path / "props", "diffuseColor", "rgb", kind, "a.exr")
     library = open_library((tmp_path / "props",), tmp_path / "cache", tmp_path / "no packs")
-    for name in ("user/a.usda", "user/packed"):
+    for name in ("user/a", "user/packed"):
         (texture,) = (m.texture for m in library.mesh(name).materials if m.texture)
         row = library.texture(texture).albedo[4, :, 0].tolist()
         assert row == [LIGHT] * 4 + [DARK] * 4

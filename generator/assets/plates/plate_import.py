@@ -81,10 +81,13 @@ def locate_camera(
 
 def exif_focal_px(data: bytes, width_px: int, height_px: int) -> float | None:
     """Focal length by the EXIF data of a photograph of this size; None = they do not have it."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
-    with Image.open(io.BytesIO(data)) as image:
-        exif = image.getexif()
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            exif = image.getexif()
+    except UnidentifiedImageError:  # A format without EXIF data, such as OpenEXR.
+        return None
     film_mm = float(exif.get_ifd(_EXIF_IFD).get(_FOCAL_35MM, 0) or 0)
     # The 35 mm equivalent has the same diagonal angle of view (CIPA DCG-001).
     return film_mm * math.hypot(width_px, height_px) / _FILM_DIAGONAL_MM if film_mm > 0 else None
