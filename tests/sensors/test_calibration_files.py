@@ -315,11 +315,81 @@ def test_cameras_of_a_kalibr_chain_project_as_opencv_does(tmp_path: Path) -> Non
     ("1 SIMPLE_RADIAL 640 512 800 320 256 -0.1", (800.0, 800.0, (-0.1, 0, 0, 0, 0, 0, 0, 0))),
     ("7 RADIAL 640 512 800 320 256 -0.1 0.02", (800.0, 800.0, (-0.1, 0.02, 0, 0, 0, 0, 0, 0))),
     ("1 RADIAL_FISHEYE 640 512 800 320 256 0.1 0.02", (800.0, 800.0, (0.1, 0.02, 0, 0))),
+    ("1 SIMPLE_FISHEYE 640 512 800 320 256", (800.0, 800.0, (0, 0, 0, 0))),
+    ("1 FISHEYE 640 512 800 790 320 256", (800.0, 790.0, (0, 0, 0, 0))),
 ])  # fmt: skip
 def test_simple_models_of_colmap(tmp_path: Path, line: str, expected: Any) -> None:
     found = sensor(tmp_path, LENS, "cameras.txt", content=line).nominal_intrinsics()
     assert (found.fx_px, found.fy_px, found.lens.coefficients) == expected
     assert (found.cx_px, found.cy_px) == (320.0, 256.0)
+
+
+def test_a_camera_is_used_next_to_one_whose_lens_has_no_counterpart(tmp_path: Path) -> None:
+    """The other one is refused when it is asked for; its place on the rig is usable."""
+    lines = "1 PINHOLE 640 512 800 790 320 256\n2 FOV 640 512 800 790 320 256 0.9\n"
+    text = LENS.replace("}", ", camera: '%s'}")
+    found = sensor(tmp_path, text % 1, "cameras.txt", content=lines)
+    assert found.nominal_intrinsics() == Intrinsics(640, 512, 800.0, 790.0, 320.0, 256.0)
+    message = told(tmp_path, text % 2, "cameras.txt")
+    assert message.startswith("cameras.txt:2:1: MODEL: 'FOV' has no lens here")
+
+    chain = KALIBR.replace("pinhole", "ds").replace("[", "[-0.2, 0.6, ", 1)
+    place = sensor(tmp_path, "rig: r, mounting: {file: FILE, frame: cam1}", content=chain)
+    np.testing.assert_allclose(rig_pose(place), OPTICAL @ np.linalg.inv(T_C1_C0), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        "mtx: [[812.4, 0, 318.7], [0, 811.9, 259.3], [0, 0, 1]]",
+        "intrinsic_matrix: [812.4, 0, 0, 0, 811.9, 0, 318.7, 259.3, 1]",
+    ],
+)
+@pytest.mark.parametrize("key", ["dist", "dist_coeff", "dist_coefs", "distortion_coeffs"])
+def test_names_of_opencvs_examples_and_the_columns_of_open3d_are_read(
+    tmp_path: Path, matrix: str, key: str
+) -> None:
+    """``PinholeCameraIntrinsic`` of Open3D writes ``intrinsic_matrix`` column by column."""
+    content = f"{matrix}\n{key}: [{D5.tolist()}]\nwidth: 640\nheight: 512\n"
+    found = sensor(tmp_path, LENS, content=content)
+    assert_projects(found.nominal_intrinsics(), project_cv(D5))
+
+
+def test_json_of_opencv_may_have_comments_and_tabs(tmp_path: Path) -> None:
+    """OpenCV writes flags of its sample as a comment: ``// flags: +fix_principal_point``."""
+    path = tmp_path / "w.json"
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("image_size", np.array([[640.0, 512.0]]))
+    storage.writeComment("flags: +fix_principal_point", False)
+    storage.write("camera_matrix", K)
+    storage.write("distortion_coefficients", D5)
+    storage.release()
+    content = path.read_text(encoding="utf-8")
+    assert "// flags" in content
+    found = sensor(tmp_path, LENS, "c.json", content=content.replace("    ", "\t"))
+    assert_projects(found.nominal_intrinsics(), project_cv(D5))
+
+
+def test_the_field_of_a_calibrated_fisheye_can_end_before_its_polynomial_folds(
+    tmp_path: Path,
+) -> None:
+    """As of a circular fisheye: corners of the image are black, and need no valid polynomial."""
+    D = np.array([0.0034, 0.0007, -0.02, 0.0002])
+    content = (ROS % ("equidistant", 4, D.tolist())).replace("812.4", "190").replace("811.9", "190")
+    assert "folds over inside the image" in told(tmp_path, LENS, content=content)
+    limited = LENS.replace("}", ", field_deg: 150}")
+    found = sensor(tmp_path, limited, content=content).nominal_intrinsics()
+
+    matrix = np.array([[190, 0, 318.7], [0, 190, 259.3], [0, 0, 1.0]])
+    assert_projects(found, project_cv(D, fisheye=True, matrix=matrix))
+    angles = np.radians([74.9, 75.1])
+    image = found.project(np.column_stack([np.sin(angles), 0 * angles, np.cos(angles)]))
+    assert np.isnan(image[:, 0]).tolist() == [False, True]
+    pinhole = COEFFICIENTS.replace(str(D5.tolist()), "[0, 0, 0, 0, 0]")
+    assert "lens.field_deg: a lens 'pinhole'" in told(tmp_path, limited, content=pinhole)
+    shipped = "size_px: [512, 512], lens: {model: calibrated, camera: tum_vi_cam0, field_deg: 100}"
+    lens = sensor(tmp_path, shipped).nominal_intrinsics().lens
+    assert lens.half_field_rad == pytest.approx(math.radians(50))
 
 
 def test_a_calibration_is_scaled_to_the_size_of_the_image(tmp_path: Path) -> None:
@@ -437,6 +507,13 @@ def test_a_pair_of_opencv_is_placed_by_r_and_t(tmp_path: Path) -> None:
     assert "has several cameras, or none" in told(tmp_path, LENS, "extrinsics.yml", content=alone)
 
 
+def test_a_place_that_is_probably_in_millimetres_is_pointed_out(tmp_path: Path) -> None:
+    content = f"R: {np.eye(3).tolist()}\nT: [-60.0, 0.5, 1.5]\n"
+    with pytest.warns(ConfigWarning, match=r"mounting: '2' is 60\..* m from '1'; .* unit: mm"):
+        found = mounted(tmp_path, "frame: '2'", "pair.yml", content)
+    assert found.offset_m == (-1.5, -60.0, 0.5)
+
+
 TF = """\
 transforms:
 - header: {stamp: {sec: 0, nanosec: 0}, frame_id: base_link}
@@ -502,7 +579,10 @@ def test_a_camera_of_nuscenes_is_placed_on_the_ego_vehicle(tmp_path: Path) -> No
     assert found.offset_m == (1.7, 0.016, 1.51)
     assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == (0.0, 0.0, 0.0)
     assert found.nominal_intrinsics() == Intrinsics(1600, 900, 1266.4, 1266.4, 816.8, 492.0)
-    scanner = mounted(tmp_path, "frame: LIDAR_TOP", "c.json", json.dumps(records))
+    # nuImages: its images are undistorted.
+    records[0]["camera_distortion"] = [-0.36, 0.2, 0.001, 0.0001, -0.05]
+    with pytest.warns(ConfigWarning, match="of nuScenes; not used: camera_distortion$"):
+        scanner = mounted(tmp_path, "frame: LIDAR_TOP", "c.json", json.dumps(records))
     # Its frame has Y ahead: facing -90 degrees, Y is the vehicle's X.
     assert (scanner.yaw_deg, scanner.pitch_deg, scanner.roll_deg) == (0.0, 0.0, 0.0)
 
@@ -669,12 +749,16 @@ CONTRADICTIONS = [
     ("hfov_deg: 60, lens: {model: calibrated, camera: euroc_cam0}", "leave out hfov_deg"),
     ("lens: {model: calibrated, camera: euroc}", "expected one of euroc_cam0"),
     (LENS, "there is no file 'camera.yaml'"),
+    (INTRINSICS + ", cy_px: 1, size_px: [0, 480]}", "intrinsics.size_px[0]: 0 is not >= 1"),
+    (INTRINSICS + ", cy_px: 1, size_px: [640, -480]}", "intrinsics.size_px[1]: -480 is not >= 1"),
 ]  # fmt: skip
 LENSES = [
     ("K: [812.4, 0, 0, 0, 811.9, 0, 318.7, 259.3, 1]",
-     "camera.yaml:1:4: camera matrix: its third row is 318.7 259.3 1, expected 0 0 1; transpose"),
+     "camera.yaml:1:4: camera matrix: its third row is 318.7 259.3 1, expected 0 0 1; transpose "
+     "it; of MATLAB, subtract 1 from cx and cy too: its first pixel is (1, 1)"),
     ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 2]", "its third row is 0 0 2, expected 0 0 1"),
-    ("K: [812.4, 0, 318.7, 1.5, 811.9, 259.3, 0, 0, 1]", "skew 1.5 has no place in a camera here"),
+    ("K: [812.4, 0, 318.7, 1.5, 811.9, 259.3, 0, 0, 1]", "skew 1.5 has no place in a camera here; "
+     "expected 0: calibrate without skew (OpenCV: CALIB_FIX_SKEW)"),
     ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\nxi: 1.2\nD: [0.1, 0.2, 0, 0]",
      "camera.yaml:2:5: xi: omnidirectional lenses have no lens here"),
     (ROS % ("none", 5, D5.tolist()), UNDISTORTED),
@@ -690,6 +774,12 @@ LENSES = [
     (ROS % ("thin", 5, D5.tolist()), "'thin' is not a known lens; expected one of plumb_bob"),
     (COEFFICIENTS + "k: [\n", "not valid YAML"),
     (COEFFICIENTS.replace("812.4, 0,", "812.4, 2,"), "skew 2"),
+    (COEFFICIENTS.replace("distortion_coefficients", "coefficients"),
+     "camera.yaml:1:1: distortion coefficients: has none, but the lens is 'plumb_bob'; expected"),
+    (COEFFICIENTS.replace("512", "512.5"),
+     "camera.yaml:1:14: image size: expected whole numbers, got 640 x 512.5"),
+    (COEFFICIENTS.replace("[-0.21, 0.09, 0.0007, -0.0004, -0.012]", "$base64$MWQg"),
+     "distortion coefficients: expected a number, got '$base64$MWQg'; write it without Base64"),
     (KALIBR, "has several cameras, or none: name one; expected one of cam0, cam1"),
 ]  # fmt: skip
 PLACES = [
@@ -701,7 +791,22 @@ PLACES = [
      "cam3.T_cn_cnm1: refers to cam2, which the file lacks"),
     ("frame: a", "tf.yaml", TF.replace("w: 0.8", "w: 1.8"), "is not a unit quaternion"),
     ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="'), "expected three numbers"),
-    ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>"),
+    ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>; give a file "
+     "of OpenCV, or a URDF"),
+    ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="nan'),
+     "r.urdf:3:1: joint 'a': origin: expected three numbers each in xyz and rpy (nan is not a fin"),
+    ("frame: a", "r.urdf", URDF.replace('parent link="base_link"', 'parent link="base"'),
+     "r.urdf:3:1: joint 'a': there is no link 'base'; expected parent and child"),
+    ("frame: a", "r.urdf", URDF.replace('child link="camera_o', 'child link="camera_link" a="o'),
+     "r.urdf:5:1: joint 'b': the link 'camera_link' has two parents"),
+    ("frame: cam1", "chain.yaml", KALIBR.replace("[0.0, 0.0, 0.0, 1.0]", "[1, 0, 0, 1]"),
+     "T_cn_cnm1: its last row is 1 0 0 1, expected 0 0 0 1; is the matrix transposed?"),
+    ("frame: velodyne", "calib.txt", OBJECT.replace("-0.27", "nan"),
+     "calib.txt:4:1: Tr_velo_to_cam: expected a number, got 'nan'"),
+    ("frame: velodyne", "calib.txt", OBJECT + OBJECT,
+     "calib.txt:6:1: P0: is stated twice, first in line 1"),
+    ("frame: cam1, rectified: true", "chain.yaml", KALIBR,
+     "mounting.rectified: selects nothing in chain.yaml, a camera chain of Kalibr; leave it out"),
 ]  # fmt: skip
 FAULTS = [
     *((text, "camera.yaml", "", fact) for text, fact in CONTRADICTIONS),
@@ -709,6 +814,15 @@ FAULTS = [
     *((f"rig: r, mounting: {{file: FILE, {text}}}", *rest) for text, *rest in PLACES),
     (LENS, "cameras.txt", "1 FOV 640 512 800 800 320 256 0.9\n",
      "cameras.txt:1:1: MODEL: 'FOV' has no lens here; expected one of"),
+    *((LENS, "cameras.txt", f"1 OPENCV 640 512 800 800 {words} 0 0 0\n",
+       f"cameras.txt:1:1: expected numbers after the model ({word} is not a finite number)")
+      for words, word in (("nan 256 0.1", "nan"), ("320 256 -inf", "-inf"))),
+    (LENS, "cameras.txt", 2 * "1 PINHOLE 640 512 800 800 320 256\n",
+     "cameras.txt:2:1: CAMERA_ID: there are two cameras 1"),
+    (LENS.replace("}", ", fisheye: true}"), "camera.yaml", ROS % ("plumb_bob", 4, D4.tolist()),
+     "camera.yaml:5:19: distortion_model: is 'plumb_bob', but fisheye: true is stated too"),
+    (LENS.replace("}", ", fisheye: true}"), "cameras.txt", "1 PINHOLE 640 512 800 800 320 256\n",
+     "lens.fisheye: selects nothing in cameras.txt, cameras of COLMAP; leave it out"),
     (LENS + ", hfov_deg: 60", "camera.yaml", "a: 1",
      "hfov_deg: the file that lens names gives it: leave it out"),
     (LENS.replace("}", ", camera: cam2}"), "camera.yaml", KALIBR,

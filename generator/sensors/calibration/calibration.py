@@ -1,6 +1,7 @@
 """Content of a calibration file, in one form for all formats, and the reading of numbers in it."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -66,26 +67,32 @@ class Calibration:
     Attributes:
         file: Its path, for messages.
         kind: Its format in words.
-        cameras: By name.
+        cameras: By name; the reason why there is none here instead of a camera.
         frames: By name; an ancestor of every frame is a root.
         unused: Names of entries that have no effect here.
+        choices: Names of the settings that select a camera of this format: fisheye, rectified.
     """
 
     file: str
     kind: str
-    cameras: Mapping[str, CalibratedCamera] = field(default_factory=dict)
+    cameras: Mapping[str, CalibratedCamera | errors.ConfigError] = field(default_factory=dict)
     frames: Mapping[str, Frame] = field(default_factory=dict)
     unused: Sequence[str] = ()
+    choices: Collection[str] = ()
 
     def camera(self, name: str) -> CalibratedCamera:
         """The camera of that name; an empty name stands for the only one.
 
         Raises:
             ValueError: there is none, or there are several.
+            ConfigError: no lens here is like its lens.
         """
-        if not name and len(self.cameras) == 1:
-            return next(iter(self.cameras.values()))
-        return self.cameras[self._known(name, list(self.cameras), "camera")]
+        if name or len(self.cameras) != 1:
+            name = self._known(name, list(self.cameras), "camera")
+        found = self.cameras[name] if name else next(iter(self.cameras.values()))
+        if isinstance(found, errors.ConfigError):
+            raise found
+        return found
 
     def mount(
         self, frame: str, relative_to: str = "", *, axes: str | None = None,
@@ -153,6 +160,26 @@ def fail(node: Node, field_name: str, fact: str) -> NoReturn:
     problems.refuse(node.position, field_name, fact)
 
 
+def attempt(read: Callable[[], CalibratedCamera]) -> CalibratedCamera | errors.ConfigError:
+    """A camera, or the reason why there is none: others of its file, and its place, are usable."""
+    try:
+        return read()
+    except errors.ConfigError as error:
+        return error
+
+
+def finite(given: object) -> float:
+    """A number as Python reads it.
+
+    Raises:
+        ValueError: it is not a number, or not a finite one.
+    """
+    value = float(given)  # type: ignore[arg-type]
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not a finite number")
+    return value
+
+
 def numbers(node: Node, count: Sequence[int], name: str) -> list[float]:
     """Read a list of numbers, possibly nested in rows, or the ``data`` of a matrix of OpenCV.
 
@@ -176,7 +203,10 @@ def numbers(node: Node, count: Sequence[int], name: str) -> list[float]:
     values = []
     for leaf in leaves:
         if isinstance(leaf.content, bool) or not isinstance(leaf.content, (int, float)):
-            fail(leaf, name, f"expected a number, got {yaml_scalars.quote_value(leaf.plain())}")
+            packed = node.get("data") and len(leaves) == 1
+            hint = "; write it without Base64" if packed else ""
+            fact = f"expected a number, got {yaml_scalars.quote_value(leaf.plain())}"
+            fail(leaf, name, fact + hint)
         values.append(float(leaf.content))
     if len(leaves) not in count:
         wanted = " or ".join(str(n) for n in sorted(count))
@@ -184,38 +214,54 @@ def numbers(node: Node, count: Sequence[int], name: str) -> list[float]:
     return values
 
 
-def camera_matrix(node: Node, name: str, columns: int = 3) -> tuple[float, float, float, float]:
+def camera_matrix(
+    node: Node, name: str, columns: int = 3, *, by_columns: bool = False
+) -> tuple[float, float, float, float]:
     """Fx, fy, cx and cy of a calibration matrix [3, columns].
+
+    Args:
+        node: Its numbers, row by row.
+        name: Name of the entry, in messages.
+        columns: 3, or 4 of a projection matrix.
+        by_columns: Whether they may also be listed column by column.
 
     Raises:
         ConfigError: it is not the matrix of a camera without skew.
     """
     K = np.array(numbers(node, [3 * columns], name)).reshape(3, columns)
+    if by_columns and not K[:2, 2].any():
+        K = K.T
     check_matrix(K, node, name)
     return (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
 
 
 def check_matrix(K: se3.Array, node: Node, name: str) -> None:
     """Raise ConfigError unless a matrix [3, 3 or 4] is ``fx 0 cx, 0 fy cy, 0 0 1``."""
+    if not np.isfinite(K).all():
+        fail(node, name, "has a number that is not finite")
     if min(K[0, 0], K[1, 1]) <= 0.0:
         fail(node, name, f"focal lengths must be positive, got {K[0, 0]:g} and {K[1, 1]:g}")
     if np.abs(K[2, :3] - (0.0, 0.0, 1.0)).max() > 1e-9:
         row = " ".join(f"{value:g}" for value in K[2, :3])
-        hint = "; transpose it: MATLAB's intrinsic matrix has these numbers in its columns"
+        hint = "; transpose it; of MATLAB, subtract 1 from cx and cy too: its first pixel is (1, 1)"
         fact = f"its third row is {row}, expected 0 0 1"
         fail(node, name, fact + (hint if max(np.abs(K[:2, 2])) == 0.0 else ""))
     if max(abs(K[0, 1]), abs(K[1, 0])) > 1e-9 * K[0, 0]:
         skew = K[0, 1] or K[1, 0]
-        fail(node, name, f"skew {skew:g} has no place in a camera here; expected 0")
+        fact = f"skew {skew:g} has no place in a camera here; expected 0: calibrate without skew"
+        fail(node, name, f"{fact} (OpenCV: CALIB_FIX_SKEW)")
 
 
 def rigid(values: Sequence[float], node: Node, name: str) -> se3.SE3:
     """Pose of 12 or 16 numbers, the rows of a matrix.
 
     Raises:
-        ConfigError: its first three columns are not a rotation.
+        ConfigError: its first three columns are not a rotation, or its last row is not 0 0 0 1.
     """
     matrix = np.array(values).reshape(-1, 4)
+    if len(matrix) == 4 and np.abs(matrix[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
+        row = " ".join(f"{value:g}" for value in matrix[3])
+        fail(node, name, f"its last row is {row}, expected 0 0 0 1; is the matrix transposed?")
     check_rotation(matrix[:3, :3], node, name)
     return se3.SE3.from_matrix(matrix)
 

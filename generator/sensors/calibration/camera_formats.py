@@ -12,29 +12,34 @@ Pixel centres are at integers in all but COLMAP's, where they are at halves, as 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from gen_data.config.problems import Position, refuse
 from gen_data.config.yaml_tree import Node
-from gen_data.core.errors import did_you_mean
+from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.core.lens import COEFFICIENTS, LensModel
 from gen_data.core.se3 import SE3
 from gen_data.sensors.calibration.calibration import (
     CalibratedCamera,
     Calibration,
     Frame,
+    attempt,
     camera_matrix,
     check_rotation,
     fail,
+    finite,
     numbers,
     rigid,
 )
 
-_MATRICES = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "intrinsic_matrix", "K", "k", "M")
+_MATRICES = (
+    "camera_matrix", "cameraMatrix", "Camera_Matrix", "intrinsic_matrix", "mtx", "K", "k", "M",
+)  # fmt: skip
 _DISTORTIONS = (
-    "distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "distCoeffs",
-    "distortion", "D", "d",
+    "distortion_coefficients", "Distortion_Coefficients", "distortion_coeffs", "dist_coeffs",
+    "distCoeffs", "dist_coeff", "dist_coefs", "distortion", "dist", "D", "d",
 )  # fmt: skip
 _MODELS: Mapping[str, LensModel] = {
     "": "brown_conrady",
@@ -55,6 +60,8 @@ _COLMAP: Mapping[str, tuple[str, ...]] = {
     "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
     "FULL_OPENCV": ("fx", "fy", "cx", "cy", *_BROWN),
     "OPENCV_FISHEYE": ("fx", "fy", "cx", "cy", *_FISHEYE),
+    "SIMPLE_FISHEYE": ("f", "cx", "cy"),
+    "FISHEYE": ("fx", "fy", "cx", "cy"),
     "SIMPLE_RADIAL_FISHEYE": ("f", "cx", "cy", "k1"),
     "RADIAL_FISHEYE": ("f", "cx", "cy", "k1", "k2"),
 }
@@ -136,8 +143,8 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
         fail(root, "", f"no camera found; expected a {known}, {_MATRICES[0]} or M1")
     if "2" in cameras and not rectified:
         frames = _pair_frames(entries)
-    kind = "a calibration of OpenCV or ROS"
-    return Calibration(root.position.file, kind, cameras, frames, entries.unused())
+    kind, choices = "a calibration of OpenCV or ROS", {"fisheye", "rectified"}
+    return Calibration(root.position.file, kind, cameras, frames, entries.unused(), choices)
 
 
 def _states_fisheye(entries: _Entries) -> bool:
@@ -151,7 +158,9 @@ def _read_camera(
     K, D = entries.take(_MATRICES, number), entries.take(_DISTORTIONS, number)
     if K is None:
         return None
-    fx, fy, cx, cy = camera_matrix(K, "camera matrix")
+    # Open3D lists this one column by column.
+    by_columns = K is entries.root.get("intrinsic_matrix")
+    fx, fy, cx, cy = camera_matrix(K, "camera matrix", by_columns=by_columns)
     stated = entries.take(("distortion_model", "distortion_type"))
     name = stated.text if stated else ""
     if stated is not None and name not in _MODELS:
@@ -159,7 +168,12 @@ def _read_camera(
         fact = f"'{name}' is not a known lens; expected one of {known}{did_you_mean(name, _MODELS)}"
         fail(stated, "distortion_model", fact)
     model = "kannala_brandt" if fisheye else _MODELS[name]
+    if name and model != _MODELS[name]:
+        fail(stated or K, "distortion_model", f"is '{name}', but fisheye: true is stated too")
     _refuse_omnidirectional(entries, number)
+    if D is None and (name or fisheye) and model != "pinhole":
+        fact = f"has none, but the lens is '{name or 'fisheye'}'; expected one of the keys"
+        fail(entries.root, "distortion coefficients", f"{fact} {', '.join(_DISTORTIONS)}")
     lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
     if D is not None and model != "pinhole":
         count = (4,) if model == "kannala_brandt" else (0, 4, 5, 8, 12, 14)
@@ -255,6 +269,12 @@ def _size_px(entries: _Entries) -> tuple[int, int] | None:
         (w,), (h,) = numbers(width, [1], "image_width"), numbers(height, [1], "image_height")
     else:
         return None
+    if w != int(w) or h != int(h):
+        fail(
+            whole or width or entries.root,
+            "image size",
+            f"expected whole numbers, got {w:g} x {h:g}",
+        )
     if min(w, h) < 1:
         # ROS drivers without a calibration send sizes of 0.
         fail(whole or width or entries.root, "image size", f"is empty, got {w:g} x {h:g}")
@@ -283,7 +303,7 @@ def kalibr_chain(root: Node) -> Calibration:
     Raises:
         ConfigError: a camera's model has no counterpart here, or an entry is malformed.
     """
-    cameras: dict[str, CalibratedCamera] = {}
+    cameras: dict[str, CalibratedCamera | ConfigError] = {}
     frames: dict[str, Frame] = {}
     unused: list[str] = []
     named = [name for name, node in root.entries.items() if node.get("camera_model")]
@@ -292,7 +312,7 @@ def kalibr_chain(root: Node) -> Calibration:
     for name in chain:
         node = root.entries[name]
         entries = _Entries(node)
-        cameras[name] = _kalibr_camera(entries)
+        cameras[name] = attempt(partial(_kalibr_camera, entries))
         imu, before = entries.take(("T_cam_imu",)), entries.take(("T_cn_cnm1",))
         inverse = entries.take(("T_imu_cam",))
         frames.setdefault(name, Frame(optical=True))
@@ -327,6 +347,7 @@ def _imu_pose(T_cam_imu: Node | None, T_imu_cam: Node | None) -> SE3 | None:
 def _kalibr_camera(entries: _Entries) -> CalibratedCamera:
     projection, distortion = entries.take(("camera_model",)), entries.take(("distortion_model",))
     given, coefficients = entries.take(("intrinsics",)), entries.take(("distortion_coeffs",))
+    size_px = _size_px(entries)
     if projection is None or given is None:
         fail(entries.root, "", "expected camera_model and intrinsics")
     if projection.text == "omni":
@@ -354,7 +375,7 @@ def _kalibr_camera(entries: _Entries) -> CalibratedCamera:
         lens = lens_of(_MODELS[name], values, coefficients, "distortion_coeffs")
     elif coefficients is not None:
         _refuse_coefficients(coefficients, "distortion_coeffs")
-    return CalibratedCamera(given.position, (fx, fy), (cx, cy), *lens, size_px=_size_px(entries))
+    return CalibratedCamera(given.position, (fx, fy), (cx, cy), *lens, size_px=size_px)
 
 
 def colmap_cameras(text: str, file: str) -> Calibration:
@@ -363,7 +384,7 @@ def colmap_cameras(text: str, file: str) -> Calibration:
     Raises:
         ConfigError: a model has no counterpart here, or a line is malformed.
     """
-    cameras = {}
+    cameras: dict[str, CalibratedCamera | ConfigError] = {}
     for k, line in enumerate(text.splitlines(), 1):
         words = line.split()
         if not words or words[0].startswith("#"):
@@ -371,30 +392,33 @@ def colmap_cameras(text: str, file: str) -> Calibration:
         place = Position(file, k, 1, line)
         if len(words) < 4:
             refuse(place, "", "expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
-        name, model = words[:2]
-        if model not in _COLMAP:
-            fact = f"'{model}' has no lens here; expected one of {', '.join(_COLMAP)}"
-            refuse(place, "MODEL", fact + did_you_mean(model, _COLMAP))
-        try:
-            width, height, *values = int(words[2]), int(words[3]), *map(float, words[4:])
-        except ValueError:
-            refuse(place, "", "expected numbers after the model")
-        names = _COLMAP[model]
-        if len(values) != len(names):
-            refuse(
-                place,
-                "PARAMS",
-                f"expected {len(names)} numbers {' '.join(names)}, got {len(values)}",
-            )
-        given = dict(zip(names, values, strict=True))
-        kind: LensModel = "kannala_brandt" if "FISHEYE" in model else "brown_conrady"
-        coefficients = [given.get(name, 0.0) for name in COEFFICIENTS[kind]]
-        lens = lens_of(kind, coefficients, Node(place, text), "PARAMS")
-        focal = (given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0)))
-        if min(focal) <= 0.0 or min(width, height) < 1:
-            refuse(place, "", "sizes and focal lengths must be positive")
-        center = (given["cx"], given["cy"])
-        cameras[name] = CalibratedCamera(place, focal, center, *lens, (width, height), "halves")
+        if words[0] in cameras:
+            refuse(place, "CAMERA_ID", f"there are two cameras {words[0]}")
+        cameras[words[0]] = attempt(partial(_colmap_camera, place, words[1:]))
     if not cameras:
         refuse(Position(file, 1, 1), "", "no camera found; expected lines of COLMAP's cameras.txt")
     return Calibration(file, "cameras of COLMAP", cameras)
+
+
+def _colmap_camera(place: Position, words: Sequence[str]) -> CalibratedCamera:
+    model, names = words[0], _COLMAP.get(words[0])
+    if names is None:
+        fact = f"'{model}' has no lens here; expected one of {', '.join(_COLMAP)}"
+        refuse(place, "MODEL", fact + did_you_mean(model, _COLMAP))
+    try:
+        width, height, *values = int(words[1]), int(words[2]), *map(finite, words[3:])
+    except ValueError as error:
+        refuse(place, "", f"expected numbers after the model ({error})")
+    if len(values) != len(names):
+        fact = f"expected {len(names)} numbers {' '.join(names)}, got {len(values)}"
+        refuse(place, "PARAMS", fact)
+    given = dict(zip(names, values, strict=True))
+    kind: LensModel = "kannala_brandt" if "FISHEYE" in model else "brown_conrady"
+    coefficients = [given.get(name, 0.0) for name in COEFFICIENTS[kind]]
+    lens = lens_of(kind, coefficients, Node(place, ()), "PARAMS")
+    focal = (given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0)))
+    if min(focal) <= 0.0 or min(width, height) < 1:
+        refuse(place, "", "sizes and focal lengths must be positive")
+    return CalibratedCamera(
+        place, focal, (given["cx"], given["cy"]), *lens, (width, height), "halves"
+    )

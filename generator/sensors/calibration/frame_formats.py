@@ -23,6 +23,7 @@ import numpy as np
 from gen_data.config.problems import Position, refuse
 from gen_data.config.yaml_tree import Node
 from gen_data.core.errors import ConfigError
+from gen_data.core.safe_xml import format_position
 from gen_data.core.se3 import SE3, turned
 from gen_data.sensors.calibration import calibration, camera_formats
 
@@ -33,6 +34,9 @@ _NAMES = {
     "Tr": "Tr_velo_to_cam",
 }
 """Names of the tracking and the odometry benchmark, by which they differ from the object one."""
+_NUSCENES = {"token", "sensor_token", "translation", "rotation", "camera_intrinsic"}
+"""Keys of a record. nuImages has \
+``camera_distortion`` of the camera, but its images are undistorted."""
 _OPTICAL = ("_optical", "_optical_frame")
 
 
@@ -88,22 +92,30 @@ def urdf_frames(robot: Element, file: str) -> calibration.Calibration:
     }
     moving = []
     for joint in robot.findall("joint"):
-        parent, child, origin = (joint.find(tag) for tag in ("parent", "child", "origin"))
         name = joint.get("name", "")
-        if parent is None or child is None:
-            raise ConfigError(f"{file}: joint '{name}' lacks its parent or child")
+        place = f"{file}{format_position(joint)}: joint '{name}'"
+        above, link = (
+            "" if found is None else found.get("link", "")
+            for found in (joint.find("parent"), joint.find("child"))
+        )
+        for end in (above, link):
+            if end not in frames:
+                raise ConfigError(f"{place}: there is no link '{end}'; expected parent and child")
+        if frames[link].parent:
+            raise ConfigError(f"{place}: the link '{link}' has two parents")
+        origin = joint.find("origin")
+        texts = origin.attrib if origin is not None else {}
         try:
-            texts = origin.attrib if origin is not None else {}
-            x, y, z = (float(v) for v in texts.get("xyz", "0 0 0").split())
-            roll, pitch, yaw = (float(v) for v in texts.get("rpy", "0 0 0").split())
-        except ValueError:
-            raise ConfigError(f"{file}: joint '{name}': expected three numbers each") from None
+            x, y, z = map(calibration.finite, texts.get("xyz", "0 0 0").split())
+            roll, pitch, yaw = map(calibration.finite, texts.get("rpy", "0 0 0").split())
+        except ValueError as error:
+            fact = f"expected three numbers each in xyz and rpy ({error})"
+            raise ConfigError(f"{place}: origin: {fact}") from None
         if joint.get("type") != "fixed":
             moving.append(name)
-        link = child.get("link", "")
         # A pitch of URDF turns X downwards.
         pose = turned((x, y, z), yaw, -pitch, roll)
-        frames[link] = calibration.Frame(parent.get("link", ""), pose, is_optical(link))
+        frames[link] = calibration.Frame(above, pose, is_optical(link))
     unused = [f"joint {name} (at 0)" for name in moving]
     return calibration.Calibration(file, "a URDF", {}, frames, unused)
 
@@ -138,12 +150,14 @@ def nuscenes_frames(records: Any, path: Path) -> calibration.Calibration:
         raise ConfigError(
             f"{path}: is not a calibrated_sensor.json of nuScenes ({error})"
         ) from None
-    return calibration.Calibration(str(path), "calibrated sensors of nuScenes", cameras, frames)
+    unused = sorted({key for record in records for key in record} - _NUSCENES)
+    kind = "calibrated sensors of nuScenes"
+    return calibration.Calibration(str(path), kind, cameras, frames, unused, {"rectified"})
 
 
 def _nuscenes_frame(record: Mapping[str, Any], modality: str, path: Path) -> calibration.Frame:
-    w, x, y, z = (float(v) for v in record["rotation"])
-    tx, ty, tz = (float(v) for v in record["translation"])
+    w, x, y, z = map(calibration.finite, record["rotation"])
+    tx, ty, tz = map(calibration.finite, record["translation"])
     norm = math.sqrt(w * w + x * x + y * y + z * z)
     if abs(norm - 1.0) > 1e-3:
         raise ConfigError(f"{path}: the rotation of {record['token']} is not a unit quaternion")
@@ -177,6 +191,8 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> calib
         place = Position(file, k, 1, line)
         cells = tuple(Node(place, _number(word), text=word) for word in rest.split())
         key = _NAMES.get(key.rstrip(":"), key.rstrip(":"))
+        if key in lines:
+            refuse(place, key, f"is stated twice, first in line {lines[key].position.line}")
         if key:
             lines[key] = Node(place, cells, text=rest.strip())
     raw = rectified and any(key.startswith("P_rect_") for key in lines)
@@ -193,12 +209,13 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> calib
     if not cameras and len(frames) < 2:
         refuse(Position(file, 1, 1), "", "no calibration of KITTI found")
     unused = [key for key in lines if key not in used]
-    return calibration.Calibration(file, "a calibration of KITTI", cameras, frames, unused)
+    kind = "a calibration of KITTI"
+    return calibration.Calibration(file, kind, cameras, frames, unused, {"rectified"})
 
 
 def _number(word: str) -> float | str:
     try:
-        return float(word)
+        return calibration.finite(word)
     except ValueError:
         return word
 

@@ -22,6 +22,8 @@ from gen_data.sensors.mounting import Mounting
 
 M = TypeVar("M", bound=base_model.Strict)
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_FAR_M = 20.0
+"""A longer distance of a sensor from its rig is probably in another unit."""
 _EXCLUDED = {
     "lens": ("hfov_deg", "intrinsics"),
     "mounting": ("offset_m", "yaw_deg", "pitch_deg", "roll_deg"),
@@ -68,8 +70,11 @@ def _load_lens(sensor: Node, lens: Node, field: str) -> dict[str, Node]:
     _warn_of_swapped_size(camera, file.text)
     _check_known_size(sensor, camera, f"{field}.lens.file", file)
     place = camera.position
+    if asked.field_deg is not None and not camera.coefficients:
+        fact = f"a lens '{camera.model}', as in {file.text}, has no limit to its field"
+        refuse(lens.entries["field_deg"].position, f"{field}.lens.field_deg", fact)
     found = {
-        "lens": _node(place, _lens_entries(camera)),
+        "lens": _node(place, _lens_entries(camera, asked.field_deg)),
         "intrinsics": _node(place, _numbers_of(camera)),
     }
     if sensor.get("size_px") is None and camera.size_px is not None:
@@ -98,10 +103,15 @@ def _load_mounting(
             "relative_axes: hand (Z out of it, as of the link of a gripper) or body"
         )
         refuse(mounting.position, f"{field}.mounting.relative_axes", fact)
-    return {
-        name: _node(file.position, value)
-        for name, value in place_of(pose, _UNITS[asked.unit]).items()
-    }
+    place = place_of(pose, _UNITS[asked.unit])
+    distance_m = math.hypot(*place["offset_m"])
+    if distance_m > _FAR_M:
+        message = (
+            f"{file.position}: {field}.mounting: '{frame}' is {distance_m:g} m from '{base}'; if "
+            f"the lengths in {file.text} are millimetres, state unit: mm"
+        )
+        warnings.warn(message, errors.ConfigWarning, stacklevel=3)
+    return {name: _node(file.position, value) for name, value in place.items()}
 
 
 def place_of(T_rig_sensor: se3.SE3, unit_m: float = 1.0) -> dict[str, Any]:
@@ -118,6 +128,10 @@ def _read(file: Node, field: str, *, fisheye: bool = False, rectified: bool = Fa
     """Read a file that a configuration names, and warn of entries without effect."""
     path = paths.find_path(file.text, file.position, field, "file")
     calibration = read_calibration(path, fisheye=fisheye, rectified=rectified)
+    for choice, is_stated in (("fisheye", fisheye), ("rectified", rectified)):
+        if is_stated and choice not in calibration.choices:
+            fact = f"selects nothing in {path}, {calibration.kind}; leave it out"
+            refuse(file.position, field.replace(".file", f".{choice}"), fact)
     if calibration.unused:
         listed = ", ".join(calibration.unused)
         message = f"{path}: {calibration.kind}; not used: {listed}"
@@ -214,9 +228,10 @@ def _validated(node: Node, model: type[M], field: str) -> M:
     return found
 
 
-def _lens_entries(camera: CalibratedCamera) -> dict[str, Any]:
+def _lens_entries(camera: CalibratedCamera, field_deg: float | None) -> dict[str, Any]:
     names = COEFFICIENTS[camera.model]
-    return {"model": camera.model, **dict(zip(names, camera.coefficients, strict=True))}
+    limit = {} if field_deg is None else {"field_deg": field_deg}
+    return {"model": camera.model, **dict(zip(names, camera.coefficients, strict=True)), **limit}
 
 
 def _numbers_of(camera: CalibratedCamera) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
         if _KITTI.search(text):
             return frame_formats.kitti_calibration(text, file, rectified=rectified)
         return colmap_cameras(text, file)
-    root = parse_yaml(_plain_yaml(text), file)
+    root = parse_yaml(_plain_json(text) if start.startswith("{") else _plain_yaml(text), file)
     if any(node.get("camera_model") for node in root.entries.values()):
         return kalibr_chain(root)
     if root.get("transforms") or root.get("child_frame_id"):
@@ -64,6 +64,11 @@ def _text(path: Path) -> str:
         raise errors.ConfigError(f"{path}: is not UTF-8 text") from None
 
 
+def _plain_json(text: str) -> str:
+    """JSON without tabs, and without OpenCV's comments. Lines and columns stay."""
+    return re.sub(r"^ *//[^\n]*", "", text.replace("\t", " "), flags=re.MULTILINE)
+
+
 def _plain_yaml(text: str) -> str:
     """YAML without the syntax of OpenCV and ROS: ``%YAML:1.0``, tags, an empty last document.
 
@@ -76,7 +81,9 @@ def _plain_yaml(text: str) -> str:
 
 def _read_xml(text: str, path: Path, *, fisheye: bool, rectified: bool) -> Calibration:
     is_urdf = re.search(r"<robot[\s>]", text) is not None
-    tag, kind = ("robot", "a URDF") if is_urdf else ("opencv_storage", "a file of OpenCV")
+    tag, kind = (
+        ("robot", "a URDF") if is_urdf else ("opencv_storage", "a file of OpenCV, or a URDF")
+    )
     try:
         root = safe_xml.parse_xml(text.encode(), str(path), tag, kind, _MAX_ELEMENTS)
     except errors.AssetError as error:

@@ -1,7 +1,7 @@
 """Lens models in a camera's configuration."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -11,6 +11,7 @@ from gen_data.core.errors import did_you_mean
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import COEFFICIENTS, Lens, LensModel
 
+SidePx = Annotated[int, Field(ge=1)]
 FieldDeg = Annotated[float, Field(gt=0, le=360)]
 
 
@@ -93,6 +94,8 @@ class CalibratedLens(base_model.Strict):
             COLMAP (cameras.txt), nuScenes (calibrated_sensor.json) or KITTI.
         fisheye: Whether the four coefficients of an OpenCV file belong to its fisheye model.
         rectified: Whether to take the rectified pinhole: the projection matrix of the file.
+        field_deg: Full field of view, outside which the image is black; null = the whole range in
+            which the model is valid.
     """
 
     model: Literal["calibrated"]
@@ -100,6 +103,7 @@ class CalibratedLens(base_model.Strict):
     file: str = ""
     fisheye: bool = False
     rectified: bool = False
+    field_deg: FieldDeg | None = None
 
     @model_validator(mode="after")
     def _has_a_source(self) -> "CalibratedLens":
@@ -131,7 +135,13 @@ class CalibratedLens(base_model.Strict):
             cy_px=known.cy_px,
             size_px=known.size_px,
         )
-        return measured.at_size(width_px, height_px, known.lens, decimals=6)
+        half_rad = (
+            known.lens.half_field_rad
+            if self.field_deg is None
+            else math.radians(0.5 * self.field_deg)
+        )
+        lens = replace(known.lens, half_field_rad=half_rad)
+        return measured.at_size(width_px, height_px, lens, decimals=6)
 
 
 class MeasuredIntrinsics(base_model.Strict):
@@ -152,7 +162,7 @@ class MeasuredIntrinsics(base_model.Strict):
     fy_px: float = Field(gt=0)
     cx_px: float
     cy_px: float
-    size_px: tuple[int, int] | None = None
+    size_px: tuple[SidePx, SidePx] | None = None
     pixel_centers: Literal["integers", "halves"] = "integers"
 
     def at_size(
