@@ -169,7 +169,10 @@ def find_segments(
     """
     instances, surfaces = read_surfaces(info, sample, sensor, shard_dir, assets)
     shown = np.flatnonzero(np.bincount(instances.ravel()))
-    listed = {i.instance_id: i for i in sample.scene_of(sensor).instances}
+    ignored = {t.instance.instance_id for t in sample.truth[sensor].objects if t.ignored}
+    listed = {
+        i.instance_id: i for i in sample.scene_of(sensor).instances if i.instance_id not in ignored
+    }
     stuff_of = {
         number: listed[number].category
         for number in shown.tolist()

@@ -312,13 +312,17 @@ class AppliedLabelMap:
         return replace(instance, category=name, category_id=number)
 
     def map_scene(self, scene: Scene) -> Scene:
-        """The scene whose instances are mapped; instances of other categories are not annotated."""
-        drop, needs_class = self.label_map.drop, self.label_map.classes is not None
-        kept_or_dropped = {*drop, *self._class_of}
+        """The scene whose instances are mapped.
+
+        Instances of ignored, dropped and other categories are not annotated, as no format of whole
+        scenes has ignored regions.
+        """
+        without = {*self.label_map.drop, *self.label_map.ignore}
+        needs_class = self.label_map.classes is not None
 
         def mapped(instance: Instance) -> Instance:
-            found = _find(instance, kept_or_dropped)
-            if found in drop or (needs_class and not found):
+            found = _find(instance, self._sources)
+            if found in without or (needs_class and not found):
                 return replace(instance, annotated=False, category_id=0)
             return self._map_instance(instance)
 

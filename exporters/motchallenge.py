@@ -8,9 +8,10 @@
 
 Rows of ``gt.txt``: ``frame,id,left,top,width,height,flag,class,visibility``. Frames, ids and pixels
 start at 1; ids are instance ids; ``flag`` is 1 for scored objects, which are pedestrians only, as
-in MOT16. ``visibility`` is the visible fraction of the whole silhouette. A frame is an instant at
-which the camera reads; after a frame that is missing, another sequence starts, numbered behind all
-views, since readers count the images.
+in MOT16. Ignored objects are distractors (8): evaluations remove tracks on them, while tracks on
+pedestrians with the flag 0 count as false. ``visibility`` is the visible fraction of the whole
+silhouette. A frame is an instant at which the camera reads; after a frame that is missing, another
+sequence starts, numbered behind all views, since readers count the images.
 
 Reference: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, table 5 (classes);
 its static person (7) sits or lies. Vans, trucks and buses are cars here; categories without a class
@@ -27,7 +28,7 @@ from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.exporters import base, image_files, sensor_selection, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 
-PEDESTRIAN, PERSON_ON_VEHICLE, BICYCLE, MOTORBIKE, STATIC_PERSON = 1, 2, 4, 5, 7
+PEDESTRIAN, PERSON_ON_VEHICLE, BICYCLE, MOTORBIKE, STATIC_PERSON, DISTRACTOR = 1, 2, 4, 5, 7, 8
 CLASSES = {
     "pedestrian": PEDESTRIAN,
     "person": PEDESTRIAN,
@@ -135,7 +136,8 @@ def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:
     if thing.box is None or box is None or not number:
         return ""
     assert thing.visible_fraction is not None, "the annotation visibility is in `needs`"
-    flag = int(number == PEDESTRIAN and not thing.ignored)
+    number = DISTRACTOR if thing.ignored else number
+    flag = int(number == PEDESTRIAN)
     corner = f"{box.x_min + 1},{box.y_min + 1},{box.width_px},{box.height_px}"
     visibility = f"{min(thing.visible_fraction, 1.0):.6f}"
     return f"{thing.instance.instance_id},{corner},{flag},{number},{visibility}"

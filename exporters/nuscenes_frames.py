@@ -135,18 +135,15 @@ class Thing:
 
 
 def annotated_things(sample: Sample) -> dict[int, Thing]:
-    """Annotated objects of a sample by instance id, except the ones that labels ignore.
+    """Annotated objects of a sample by instance id, without those ignored in all their images.
 
     Raises:
         ConfigError: a category has more objects than panoptic labels can tell apart.
     """
     scene = sample.scene
-    ignored = {
-        thing.instance.instance_id
-        for truth in sample.truth.values()
-        for thing in truth.objects
-        if thing.ignored
-    }
+    shown = [t for truth in sample.truth.values() for t in truth.objects if t.box is not None]
+    ignored = {t.instance.instance_id for t in shown if t.ignored}
+    ignored -= {t.instance.instance_id for t in shown if not t.ignored}
     bodies: dict[int, Body] = {}
     for body in scene.bodies:
         bodies.setdefault(body.instance_id, body)

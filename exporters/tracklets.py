@@ -130,7 +130,7 @@ def _pose(box: OrientedBox) -> list[float]:
 def _visibility(
     thing: ObjectTruth | None, box_camera: OrientedBox, truth: ImageTruth
 ) -> dict[str, int]:
-    if thing is None or thing.box is None:
+    if thing is None or thing.box is None or thing.ignored:
         uv = truth.camera.intrinsics.project(np.array(box_camera.T_frame_box.translation_m))
         k = truth.camera.intrinsics
         if not np.isfinite(uv).all():

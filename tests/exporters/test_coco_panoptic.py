@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from gen_data.exporters.coco_panoptic import CocoPanoptic
+from gen_data.exporters.label_map import LabelMap, MappedExporter
 from tests.exporters.datasets import made_of
 from tests.exporters.label_readers import pixels, segments_of
 
@@ -131,11 +133,18 @@ def test_stuff_has_the_same_ids_in_a_training_and_a_test_set_with_other_scenery(
     assert third["my own"] == third["aaa"] + 1
 
 
-def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:
-    """Evaluation leaves out predictions there."""
-    sample = world.samples[0]
+@pytest.mark.parametrize("by_map", [False, True])
+def test_ignored_objects_are_void(world: Any, tmp_path: Path, by_map: bool) -> None:
+    """Evaluation leaves out predictions there; also if the map has no class for them."""
+    sample, exporter = world.samples[0], CocoPanoptic()
     first, *others = sample.truth["color"].objects
-    folder = world.export(CocoPanoptic(), world.info(1), [world.ignoring(sample)], tmp_path)
+    assert first.instance.category == "car"
+    if by_map:
+        classes = {"crate": None, "pedestrian": None}
+        exporter = MappedExporter(exporter, LabelMap(classes=classes, others="ignore"))
+    else:
+        sample = world.ignoring(sample)
+    folder = world.export(exporter, world.info(1), [sample], tmp_path)
     (annotation,) = read(folder)["annotations"]
     assert len(annotation["segments_info"]) == len(others)
     ids = segments_of(folder / "annotations/panoptic_train" / annotation["file_name"])

@@ -26,8 +26,14 @@ OWN_IMAGES = PACKED | {
     "tapvid", "usd",
 }  # fmt: skip
 """Formats without image files of the shards."""
-TRACKS = {"argoverse2", "kitti_raw", "nuscenes"}
+TRACKS = {"argoverse2", "nuscenes"}
 """Formats of tracks, from which an ignored object disappears and a missing one does not."""
+WITHOUT_OBJECTS = {
+    "birdseye", "calibration", "culane", "graspnet", "kitti_stereo", "lerobot", "lidar_flow",
+    "map_vectors", "opendrive", "openlane", "rlds", "scannet", "scene_text", "semantickitti",
+    "tables", "tapvid", "tum_rgbd",
+}  # fmt: skip
+"""Formats that state no object, or of which every surface keeps its class."""
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -126,4 +132,24 @@ def test_only_formats_with_a_mark_have_ignored_objects_with_or_without_a_class(
         files(world.export(MappedExporter(exporter, m), info, samples[:1], tmp_path / m.others))
         for m in maps
     )
+    # Panoptic images have stuff where objects were dropped.
+    differing = EVERY_CLASS | NO_CLASS | {"coco_panoptic"}
+    assert (dropped != ignored) == (exporter.type in differing)
+
+
+def test_ignored_categories_are_left_out_by_formats_without_a_mark(
+    exporter: Any, world: Any, tmp_path: Path
+) -> None:
+    """As dropped ones, also from boxes in space, which have no images."""
+    info, samples = given(exporter, world)
+    maps = {
+        "all": LabelMap(),
+        "dropped": LabelMap(drop=("car",)),
+        "ignored": LabelMap(ignore=("car",)),
+    }
+    plain, dropped, ignored = (
+        files(world.export(MappedExporter(exporter, m), info, samples[:1], tmp_path / name))
+        for name, m in maps.items()
+    )
+    assert (plain != dropped) == (exporter.type not in WITHOUT_OBJECTS)
     assert (dropped != ignored) == (exporter.type in EVERY_CLASS | NO_CLASS)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gen_data.exporters.motchallenge import MotChallenge, mot_class
-from tests.exporters.drives import stems
+from tests.exporters.drives import drive_info, stems
 
 
 def test_mot_rows_count_from_1_and_sequences_describe_them(exported: Any, samples: Any) -> None:
@@ -75,31 +75,57 @@ def trackeval_scores(dataset: Any, sequence: str, name: str) -> dict[str, float]
     }
 
 
+PERFECT = pytest.approx({"HOTA": 1.0, "MOTA": 1.0, "IDF1": 1.0}, abs=1e-9)
+
+
+def gt_rows(folder: Path) -> list[list[str]]:
+    """Columns of the rows of the only sequence of a split."""
+    (path,) = folder.glob("*/gt/gt.txt")
+    return [line.split(",") for line in path.read_text().splitlines()]
+
+
+def pedestrian_scores(folder: Path, rows: Any, tmp_path: Path) -> dict[str, float]:
+    """Scores of tracks with the frames, ids and boxes of rows of the truth."""
+    import trackeval
+
+    (sequence,) = (path.name for path in folder.iterdir())
+    data = tmp_path / "trackers/truth/data"
+    data.mkdir(parents=True, exist_ok=True)
+    lines = [f"{','.join(row[:6])},1,-1,-1,-1" for row in rows]
+    (data / f"{sequence}.txt").write_text("\n".join(lines))
+    options = {"GT_FOLDER": str(folder), "TRACKERS_FOLDER": str(tmp_path / "trackers"),
+               "OUTPUT_FOLDER": str(tmp_path / "results"), "SKIP_SPLIT_FOL": True,
+               "SEQ_INFO": {sequence: 4}, "PRINT_CONFIG": False}  # fmt: skip
+    dataset = trackeval.datasets.MotChallenge2DBox(options)
+    return trackeval_scores(dataset, sequence, "pedestrian")
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("split", ["train", "val"])
 def test_trackeval_scores_the_truth_as_perfect(exported: Any, tmp_path: Path, split: str) -> None:
     """And tracks that exchange their identities half way as worse."""
-    import trackeval
-
     folder = exported(MotChallenge()) / f"street-{split}"
-    (sequence,) = (path.name for path in folder.iterdir())
-    rows = [line.split(",") for line in (folder / sequence / "gt/gt.txt").read_text().splitlines()]
-    people = [row for row in rows if row[6:8] == ["1", "1"]]
+    people = [row for row in gt_rows(folder) if row[6:8] == ["1", "1"]]
     assert len(people) >= 3
+    exchanged = [[k, "77" if k in "34" else number, *rest] for k, number, *rest in people]
+    assert pedestrian_scores(folder, people, tmp_path) == PERFECT
+    assert pedestrian_scores(folder, exchanged, tmp_path)["IDF1"] < 0.9
 
-    def scores(ids: dict[str, str]) -> dict[str, float]:
-        lines = [
-            f"{row[0]},{ids.get(row[0], row[1])},{','.join(row[2:6])},1,-1,-1,-1" for row in people
-        ]
-        data = tmp_path / "trackers/truth/data"
-        data.mkdir(parents=True, exist_ok=True)
-        (data / f"{sequence}.txt").write_text("\n".join(lines))
-        options = {**{"GT_FOLDER": str(folder), "TRACKERS_FOLDER": str(tmp_path / "trackers")},
-                   **{"OUTPUT_FOLDER": str(tmp_path / "results"), "SKIP_SPLIT_FOL": True},
-                   **{"SEQ_INFO": {sequence: 4}, "PRINT_CONFIG": False}}  # fmt: skip
-        dataset = trackeval.datasets.MotChallenge2DBox(options)
-        return trackeval_scores(dataset, sequence, "pedestrian")
 
-    assert scores({}) == pytest.approx({"HOTA": 1.0, "MOTA": 1.0, "IDF1": 1.0}, abs=1e-9)
-    assert scores({"3": "77", "4": "77"})["IDF1"] < 0.9
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_trackeval_does_not_punish_tracks_on_ignored_objects(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """A tracker follows the pedestrian through all frames, of which labels ignore the second."""
+
+    def flagged(things: Any) -> Any:
+        return tuple(replace(t, ignored=t.instance.instance_id == 2) for t in things)
+
+    frames = [world.with_objects(s, flagged) if s.index == 1 else s for s in samples[:4]]
+    world.export(MotChallenge(), drive_info(world), frames, tmp_path)
+    folder = tmp_path / "dataset/street-train"
+    followed = [row for row in gt_rows(folder) if row[1] == "2"]
+    assert [row[6:8] for row in followed] == [["1", "1"], ["0", "8"], ["1", "1"], ["1", "1"]]
+    assert pedestrian_scores(folder, followed, tmp_path) == PERFECT
