@@ -111,13 +111,16 @@ def matrix(name: str, values: Array) -> str:
 @pytest.mark.parametrize(("name", "content", "frame", "pose"), [
     ("slam.yaml", "1", "1", POSE),
     ("slam.yaml", "2", "2", POSE @ RIGHT),
+    ("vins.yaml", "%YAML:1.0\n\nimu: 1\n", "cam1", RIGHT),
     ("sensor.yaml", "", "camera", POSE),
 ])  # fmt: skip
 def test_cameras_of_orb_slam_and_euroc_are_placed_from_the_body(
     tmp_path: Path, name: str, content: str, frame: str, pose: Array
 ) -> None:
     """``T_b_c1``, ``T_c1_c2`` and ``T_BS`` take points of the camera to the body or camera 1."""
-    if content:
+    if content.startswith("%"):
+        content += matrix("body_T_cam0", POSE) + matrix("body_T_cam1", RIGHT)
+    elif content:
         second = slam("Camera2", "PinHole").partition('"\n')[2].partition("Camera.width")[0]
         content = slam("Camera1", "PinHole") + second
         content += matrix("IMU.T_b_c1", POSE) + matrix("Stereo.T_c1_c2", RIGHT)
@@ -177,6 +180,7 @@ UNREAD: list[Any] = [
     ("cameras.bin", binary((1, 99, [])), "is not a cameras.bin of COLMAP (the model 99 is not"),
     ("cameras.bin", b"", "is not a cameras.bin of COLMAP (unpack_from requires"),
     ("ost.txt", b"# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n", "give ost.yaml"),
+    ("a.ini", b"[image]\n\n# comment\nwidth\n640\n", "is a calibration of ROS as INI, which"),
     ("results-cam.txt", b"Calibration results\n===\n", ":1:1: expected CAMERA_ID MODEL WIDTH"),
     ("cam_to_pose.txt", b"image_00: 0.03 -0.09 0.99 1.5\n", ":1:1: expected CAMERA_ID MODEL WIDTH"),
     ("a.npz", b"PK\x03\x04\x00", "is an archive of NumPy or Python, which is not read here; write"),
@@ -187,7 +191,8 @@ UNREAD: list[Any] = [
     ("a.usda", b'#usda 1.0\ndef Camera "c" {}\n', "is an OpenUSD stage, which is not read here"),
     ("a.feather", b"ARROW1\x00\x00", "is a table of Arrow, as of Argoverse, which is not read"),
     ("a.json", b'{"beam_altitude_angles": [1.0]}', "is metadata of an Ouster scanner, which"),
-    ("a.yaml", b"model_type: MEI\n", "no camera found; expected a camera matrix such as K, camera_"
+    ("a.yaml", b"%YAML:1.0\n---\nmodel_type: MEI\n", "camodocal without a lens here, which is not"),
+    ("a.yaml", b"a: 1\n", "no camera found; expected a camera matrix such as K, camera_"
      "matrix or M1; of other formats, type fx_px, fy_px, cx_px and cy_px as intrinsics"),
     ("a.json", nerf("EQUIRECTANGULAR").encode(), "a.json:2:18: camera_model: 'EQUIRECTANGULAR' has "
      "no lens here; expected one of OPENCV, PINHOLE"),

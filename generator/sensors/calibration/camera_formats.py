@@ -193,12 +193,20 @@ def _read_camera(
         fact = f"has none, but the lens is '{name or 'fisheye'}'; expected one of the keys"
         fail(entries.root, "distortion coefficients", f"{fact} {', '.join(_DISTORTIONS)}")
     lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
+    unstated = False
     if D is not None and model != "pinhole":
         count = (4,) if model == "kannala_brandt" else (0, 4, 5, 8, 12, 14)
-        lens = lens_of(model, numbers(D, count, "distortion coefficients"), D, "distortion")
+        values = numbers(D, count, "distortion coefficients")
+        lens = lens_of(model, values, D, "distortion")
+        # calibrateCamera writes five or more, its fisheye module four.
+        unstated = len(values) == 4 and not name and not fisheye and lens[0] != "pinhole"
+        unstated &= entries.root.get("fisheye_model") is None
     elif D is not None:
         _refuse_coefficients(D, "distortion coefficients")
-    return CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size_px), None
+    camera = CalibratedCamera(
+        K.position, (fx, fy), (cx, cy), *lens, size_px=size_px, unstated=unstated
+    )
+    return camera, None
 
 
 def _refuse_omnidirectional(entries: Entries, number: str) -> None:

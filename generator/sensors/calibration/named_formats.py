@@ -3,7 +3,8 @@
 * ``transforms.json`` of nerfstudio and instant-ngp: pixel centres at halves, as in COLMAP.
 * Settings of ORB-SLAM2 and 3 and of Stella-VSLAM. ``T_c1_c2`` takes points of camera 2 to camera 1,
   ``T_b_c1`` takes points of camera 1 to the body.
-* camodocal (VINS-Mono, VINS-Fusion): its ``k2`` to ``k5`` are OpenCV's ``k1`` to ``k4``.
+* camodocal (VINS-Mono, VINS-Fusion): its ``k2`` to ``k5`` are OpenCV's ``k1`` to ``k4``;
+  ``body_T_cam0`` in another file takes points of the camera to the body.
 """
 
 from collections.abc import Mapping
@@ -73,7 +74,12 @@ _LAYOUTS = (
     _camodocal("fx fy cx cy", "PINHOLE", _BROWN, "distortion_parameters."),
     _camodocal("mu mv u0 v0", "KANNALA_BRANDT", _SHIFTED, "projection_parameters."),
 )  # fmt: skip
-_PLACES = (("1", "body", "IMU.T_b_c1"), ("2", "1", "Stereo.T_c1_c2"))
+_PLACES = (
+    ("1", "body", "IMU.T_b_c1"),
+    ("2", "1", "Stereo.T_c1_c2"),
+    ("cam0", "body", "body_T_cam0"),
+    ("cam1", "body", "body_T_cam1"),
+)
 """Frames with their parents, and the entries with their poses."""
 
 
@@ -81,7 +87,7 @@ def named_cameras(root: Node) -> calibration.Calibration | None:
     """Cameras of one of these formats; None if the file has another one."""
     entries = camera_formats.Entries(Node(root.position, _flat(root)))
     found = [one for one in _LAYOUTS if all(n in entries.root.entries for n in one.numbers.split())]
-    if not found:
+    if not found and not any(entries.root.get(name) for *_, name in _PLACES):
         return None
     size_px = camera_formats.size_px_of(entries)
     cameras = {
@@ -96,7 +102,8 @@ def named_cameras(root: Node) -> calibration.Calibration | None:
             frames.setdefault(parent, calibration.Frame(optical=parent != "body"))
             frames[frame] = calibration.Frame(parent, place, optical=True)
     unused = dict.fromkeys(entries.group(name) for name in entries.unused())
-    return calibration.Calibration(root.position.file, found[0].kind, cameras, frames, list(unused))
+    kind = found[0].kind if found else "places of VINS"
+    return calibration.Calibration(root.position.file, kind, cameras, frames, list(unused))
 
 
 def _flat(node: Node, prefix: str = "") -> dict[str, Node]:

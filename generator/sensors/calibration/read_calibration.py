@@ -30,13 +30,16 @@ _WRITE = "write camera_matrix and dist_coeffs with cv2.FileStorage"
 _TYPE = "type its fx_px, fy_px, cx_px and cy_px as intrinsics, and its coefficients as lens"
 _BEAMS = "list the elevations of its beams as elevations_deg, in the model of a lidar"
 _UNREAD: Mapping[bytes, tuple[str, str]] = {
-    rb"\[image\]\s+width": ("a calibration of ROS as INI", "give ost.yaml of the same archive"),
+    rb"(?m)^\[image\]\s*$": ("a calibration of ROS as INI", "give ost.yaml of the same archive"),
     rb"\A(PK\x03\x04|\x93NUMPY|\x80[\x02-\x05])": ("an archive of NumPy or Python", _WRITE),
     rb"\A(MATLAB |\x89HDF)": ("a MAT-file", f"use cameraIntrinsicsToOpenCV, and {_WRITE}"),
     rb"<(calibration|document)\b": ("XML of Metashape", "export the calibration as OpenCV"),
     rb"\AParGroup": (
         "a file of HALCON",
         "undistort the images, and type Focus / Sx, Focus / Sy, Cx and Cy as intrinsics",
+    ),
+    rb"(?m)^model_type:\s*(MEI|SCARAMUZZA)": (
+        "a camera of camodocal without a lens here", "calibrate it as KANNALA_BRANDT",
     ),
     rb'"value0"': ("JSON of Basalt", _TYPE),
     rb"\A(#usda|PXR-USDC)": (
