@@ -178,14 +178,14 @@ _LOADED: CountCache[Node] = CountCache(16)
 """Trees of the latest files, by path and content."""
 
 
-def parse_yaml(text: str, file: str) -> Node:
+def parse_yaml(text: str, file: str, max_nodes: int = MAX_NODES) -> Node:
     """Parse the mapping in a YAML text; ``file`` is its name in messages.
 
     Raises:
         ConfigError: the text is not a valid document; the message lists all independent errors.
     """
     # A byte order mark is legal at the start of a document, and has no meaning in UTF-8.
-    node = _Reader(text.removeprefix("\ufeff"), file).read()
+    node = _Reader(text.removeprefix("\ufeff"), file, max_nodes=max_nodes).read()
     if not isinstance(node.content, Mapping):
         what = "a list" if isinstance(node.content, tuple) else quote_value(node.content)
         refuse(node.position, "", f"expected a mapping of settings, got {what}")
@@ -233,8 +233,17 @@ class _Reader:
     It descends recursively, which is safe because the depth is limited before each descent.
     """
 
-    def __init__(self, text: str, file: str, *, start: int = 0, within: FieldPath = ()) -> None:
+    def __init__(
+        self,
+        text: str,
+        file: str,
+        *,
+        start: int = 0,
+        within: FieldPath = (),
+        max_nodes: int = MAX_NODES,
+    ) -> None:
         """Read ``text[start:]``, which is the value of the field ``within``."""
+        self._max_nodes = max_nodes
         self._text = text[start:]
         self._start = start
         self._path = list(within)
@@ -325,8 +334,8 @@ class _Reader:
         if event.anchor is not None:
             self._anchors[event.anchor] = None
         self._nodes += 1
-        if self._nodes > MAX_NODES:
-            self._abort(where, f"more than {MAX_NODES} values in one document")
+        if self._nodes > self._max_nodes:
+            self._abort(where, f"more than {self._max_nodes} values in one document")
         if depth >= MAX_DEPTH:
             self._abort(where, _TOO_DEEP)
 

@@ -162,10 +162,23 @@ def test_a_principal_point_is_shifted_scaled_and_cropped(
 def test_a_file_of_opencv_projects_as_opencv_does(tmp_path: Path, ending: str, D: Array) -> None:
     """In all its formats, as it writes them itself; the image has the calibrated size."""
     content = opencv_text(D, ending, tmp_path)
-    found = sensor(tmp_path, LENS, f"cam{ending}", content=content)
+    stated = LENS.replace("}", ", fisheye: false}")
+    found = sensor(tmp_path, stated, f"cam{ending}", content=content)
 
     assert found.size_px == (640, 512)
     assert_projects(found.nominal_intrinsics(), project_cv(D))
+
+
+def test_four_coefficients_without_a_stated_lens_are_pointed_out(tmp_path: Path) -> None:
+    """OpenCV's ``calibrateCamera`` returns at least five, its fisheye module four."""
+    content = opencv_text(D4, ".yml", tmp_path)
+    with pytest.warns(ConfigWarning, match="four coefficients count as .*; state fisheye: true"):
+        found = sensor(tmp_path, LENS, content=content)
+    assert_projects(found.nominal_intrinsics(), project_cv(D4))
+    stated = LENS.replace("}", ", fisheye: false}")
+    assert sensor(tmp_path, stated) == found
+    marked = opencv_text(D4, ".yml", tmp_path, fisheye_model=0)
+    assert sensor(tmp_path, LENS, content=marked) == found
 
 
 def test_four_coefficients_of_a_fisheye_are_so_if_stated(tmp_path: Path) -> None:

@@ -34,6 +34,7 @@ class CalibratedCamera:
         size_px: Size of the calibrated images; None = the file does not state it.
         pixel_centers: Where pixel centres lie in its image coordinates: at integers (OpenCV, ROS,
             Kalibr, KITTI) or halves (COLMAP).
+        unstated: Whether its four coefficients may be of a fisheye: the file does not state it.
     """
 
     position: problems.Position
@@ -43,6 +44,7 @@ class CalibratedCamera:
     coefficients: tuple[float, ...] = ()
     size_px: tuple[int, int] | None = None
     pixel_centers: str = "integers"
+    unstated: bool = False
 
 
 @dataclass(frozen=True, slots=True)

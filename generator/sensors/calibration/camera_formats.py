@@ -10,6 +10,7 @@ Pixel centres are at integers in all but COLMAP's, where they are at halves, as 
 """
 
 import re
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -46,6 +47,7 @@ _MODELS: Mapping[str, LensModel] = {
     "plumb_bob": "brown_conrady",
     "rational_polynomial": "brown_conrady",
     "radtan": "brown_conrady",
+    "radial-tangential": "brown_conrady",
     "equidistant": "kannala_brandt",
     "fisheye": "kannala_brandt",
     "none": "pinhole",
@@ -68,6 +70,16 @@ _COLMAP: Mapping[str, tuple[str, ...]] = {
 """Parameters of COLMAP's models that have a counterpart here, in order."""
 
 
+_COLMAP_IDS = (
+    ("SIMPLE_PINHOLE", 3), ("PINHOLE", 4), ("SIMPLE_RADIAL", 4), ("RADIAL", 5), ("OPENCV", 8),
+    ("OPENCV_FISHEYE", 8), ("FULL_OPENCV", 12), ("FOV", 5), ("SIMPLE_RADIAL_FISHEYE", 4),
+    ("RADIAL_FISHEYE", 5), ("THIN_PRISM_FISHEYE", 12), ("RAD_TAN_THIN_PRISM_FISHEYE", 16),
+    ("SIMPLE_DIVISION", 4), ("DIVISION", 5), ("SIMPLE_FISHEYE", 3), ("FISHEYE", 4), ("EUCM", 6),
+    ("EQUIRECTANGULAR", 2),
+)  # fmt: skip
+"""Models of ``cameras.bin`` by their number, with the number of their parameters."""
+
+
 def lens_of(
     model: LensModel, given: Sequence[float], node: Node, name: str
 ) -> tuple[LensModel, tuple[float, ...]]:
@@ -87,7 +99,7 @@ def lens_of(
     return model, values
 
 
-class _Entries:
+class Entries:
     """Entries of a mapping, under any of several names; it remembers which were taken."""
 
     def __init__(self, root: Node) -> None:
@@ -107,6 +119,11 @@ class _Entries:
         """Names of the entries that were not taken."""
         return [key for key in self.root.entries if key not in self.used]
 
+    def group(self, name: str) -> str:
+        """The part of a name before its first dot, if no name with that part was taken."""
+        first, dot, _ = name.partition(".")
+        return name if any(key.startswith(first + dot) for key in self.used) else first
+
 
 def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -> Calibration:
     """One camera or a pair, of OpenCV or ROS.
@@ -120,8 +137,8 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
     Raises:
         ConfigError: there is no camera matrix, or an entry is malformed.
     """
-    entries = _Entries(root)
-    size_px = _size_px(entries)
+    entries = Entries(root)
+    size_px = size_px_of(entries)
     named = root.get("camera_name")
     single = named.text if named else "camera"
     read = _read_rectified if rectified else _read_camera
@@ -140,20 +157,21 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
         frames = _pair_frames(entries)
     if not cameras and not frames:
         known = "projection matrix such as P" if rectified else "camera matrix such as K"
-        fail(root, "", f"no camera found; expected a {known}, {_MATRICES[0]} or M1")
+        fact = f"no camera found; expected a {known}, {_MATRICES[0]} or M1; of other formats, type"
+        fail(root, "", f"{fact} fx_px, fy_px, cx_px and cy_px as intrinsics")
     if "2" in cameras and not rectified:
         frames = _pair_frames(entries)
     kind, choices = "a calibration of OpenCV or ROS", {"fisheye", "rectified"}
     return Calibration(root.position.file, kind, cameras, frames, entries.unused(), choices)
 
 
-def _states_fisheye(entries: _Entries) -> bool:
+def _states_fisheye(entries: Entries) -> bool:
     flag = entries.take(("fisheye_model",))
     return flag is not None and flag.content not in (0, False, "0", "false")
 
 
 def _read_camera(
-    entries: _Entries, number: str, size_px: tuple[int, int] | None, fisheye: bool
+    entries: Entries, number: str, size_px: tuple[int, int] | None, fisheye: bool
 ) -> tuple[CalibratedCamera, None] | None:
     K, D = entries.take(_MATRICES, number), entries.take(_DISTORTIONS, number)
     if K is None:
@@ -175,15 +193,23 @@ def _read_camera(
         fact = f"has none, but the lens is '{name or 'fisheye'}'; expected one of the keys"
         fail(entries.root, "distortion coefficients", f"{fact} {', '.join(_DISTORTIONS)}")
     lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
+    unstated = False
     if D is not None and model != "pinhole":
         count = (4,) if model == "kannala_brandt" else (0, 4, 5, 8, 12, 14)
-        lens = lens_of(model, numbers(D, count, "distortion coefficients"), D, "distortion")
+        values = numbers(D, count, "distortion coefficients")
+        lens = lens_of(model, values, D, "distortion")
+        # calibrateCamera writes five or more, its fisheye module four.
+        unstated = len(values) == 4 and not name and not fisheye and lens[0] != "pinhole"
+        unstated &= entries.root.get("fisheye_model") is None
     elif D is not None:
         _refuse_coefficients(D, "distortion coefficients")
-    return CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size_px), None
+    camera = CalibratedCamera(
+        K.position, (fx, fy), (cx, cy), *lens, size_px=size_px, unstated=unstated
+    )
+    return camera, None
 
 
-def _refuse_omnidirectional(entries: _Entries, number: str) -> None:
+def _refuse_omnidirectional(entries: Entries, number: str) -> None:
     """Raise ConfigError for a camera of OpenCV's omnidir module, whose parameter xi is not 0."""
     xi = entries.take(("xi", "Xi", "XI"), number)
     if xi is not None and any(numbers(xi, [1], "xi")):
@@ -198,7 +224,7 @@ def _refuse_coefficients(D: Node, name: str) -> None:
         fail(D, name, "are not 0, but the lens is 'none'; state the model that they belong to")
 
 
-def _read_out(camera: CalibratedCamera, entries: _Entries) -> CalibratedCamera:
+def _read_out(camera: CalibratedCamera, entries: Entries) -> CalibratedCamera:
     """A camera of which a region of interest is read out, or blocks of pixels together.
 
     Source: ROS, sensor_msgs/CameraInfo: matrices and the region refer to all pixels. Pixel i of
@@ -234,7 +260,7 @@ def _whole(node: Node, key: str) -> int:
 
 
 def _read_rectified(
-    entries: _Entries, number: str, size_px: tuple[int, int] | None, _fisheye: bool
+    entries: Entries, number: str, size_px: tuple[int, int] | None, _fisheye: bool
 ) -> tuple[CalibratedCamera, Frame] | None:
     P = entries.take(("projection_matrix", "P", "p"), number)
     if P is None:
@@ -254,11 +280,11 @@ def shifted(P: Node, parent: str) -> Frame:
     return Frame(parent, SE3((x, y, z)), optical=True)
 
 
-def _size_px(entries: _Entries) -> tuple[int, int] | None:
+def size_px_of(entries: Entries) -> tuple[int, int] | None:
     """Size of the calibrated images; None if the file does not state it."""
     width, height = (
-        entries.take((f"image_{side}", side, f"image_{side.title()}"))
-        for side in ("width", "height")
+        entries.take((f"image_{side}", side, f"image_{side.title()}", f"Camera.{side}", *others))
+        for side, *others in (("width", "w", "Camera.cols"), ("height", "h", "Camera.rows"))
     )
     whole = entries.take(
         ("cameraResolution", "image_size", "imageSize", "img_size", "resolution", "size_px")
@@ -281,7 +307,7 @@ def _size_px(entries: _Entries) -> tuple[int, int] | None:
     return (int(w), int(h))
 
 
-def _pair_frames(entries: _Entries) -> dict[str, Frame]:
+def _pair_frames(entries: Entries) -> dict[str, Frame]:
     """Frames of ``stereoCalibrate``: ``R``, ``T`` map points of camera 1 to camera 2."""
     R, T = entries.take(("R", "rotation")), entries.take(("T", "translation"))
     if R is None or T is None:
@@ -311,7 +337,7 @@ def kalibr_chain(root: Node) -> Calibration:
     chain = sorted(named, key=lambda name: int(name[3:])) if numbered else named
     for name in chain:
         node = root.entries[name]
-        entries = _Entries(node)
+        entries = Entries(node)
         cameras[name] = attempt(partial(_kalibr_camera, entries))
         imu, before = entries.take(("T_cam_imu",)), entries.take(("T_cn_cnm1",))
         inverse = entries.take(("T_imu_cam",))
@@ -333,6 +359,22 @@ def kalibr_chain(root: Node) -> Calibration:
     return Calibration(root.position.file, "a camera chain of Kalibr", cameras, frames, unused)
 
 
+def euroc_sensor(root: Node) -> Calibration:
+    """``sensor.yaml`` of a camera of EuRoC and others; ``T_BS`` is its pose in the body's frame.
+
+    Raises:
+        ConfigError: the pose is malformed.
+    """
+    entries = Entries(root)
+    cameras = {"camera": attempt(partial(_kalibr_camera, entries))}
+    frames: dict[str, Frame] = {}
+    pose = entries.take(("T_BS",))
+    if pose is not None:
+        place = rigid(numbers(pose, [12, 16], "T_BS"), pose, "T_BS")
+        frames = {"body": Frame(), "camera": Frame("body", place, optical=True)}
+    return Calibration(root.position.file, "a sensor of EuRoC", cameras, frames, entries.unused())
+
+
 _NUMBERED = re.compile(r"cam\d+")
 
 
@@ -344,10 +386,11 @@ def _imu_pose(T_cam_imu: Node | None, T_imu_cam: Node | None) -> SE3 | None:
     return None
 
 
-def _kalibr_camera(entries: _Entries) -> CalibratedCamera:
+def _kalibr_camera(entries: Entries) -> CalibratedCamera:
     projection, distortion = entries.take(("camera_model",)), entries.take(("distortion_model",))
-    given, coefficients = entries.take(("intrinsics",)), entries.take(("distortion_coeffs",))
-    size_px = _size_px(entries)
+    given = entries.take(("intrinsics",))
+    coefficients = entries.take(("distortion_coeffs", "distortion_coefficients"))
+    size_px = size_px_of(entries)
     if projection is None or given is None:
         fail(entries.root, "", "expected camera_model and intrinsics")
     if projection.text == "omni":
@@ -365,7 +408,7 @@ def _kalibr_camera(entries: _Entries) -> CalibratedCamera:
     fx, fy, cx, cy = rest
     name = distortion.text if distortion else "none"
     lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
-    if name not in ("radtan", "equidistant", "none"):
+    if name not in ("radtan", "radial-tangential", "equidistant", "none"):
         fact = f"'{name}' has no lens here; expected radtan, equidistant or none"
         fail(distortion or projection, "distortion_model", fact)
     if name != "none":
@@ -376,6 +419,26 @@ def _kalibr_camera(entries: _Entries) -> CalibratedCamera:
     elif coefficients is not None:
         _refuse_coefficients(coefficients, "distortion_coeffs")
     return CalibratedCamera(given.position, (fx, fy), (cx, cy), *lens, size_px=size_px)
+
+
+def colmap_text(data: bytes) -> str:
+    """The lines of ``cameras.txt`` of the content of COLMAP's ``cameras.bin``.
+
+    Source: the description of the binary format at https://colmap.github.io/format.html
+
+    Raises:
+        ValueError: it ends too early, or has a model of a later version.
+    """
+    lines, at = [], 8
+    for _ in range(struct.unpack_from("<Q", data)[0]):
+        number, model, *size = struct.unpack_from("<IiQQ", data, at)
+        if not 0 <= model < len(_COLMAP_IDS):
+            raise ValueError(f"the model {model} is not known")
+        name, count = _COLMAP_IDS[model]
+        values = struct.unpack_from(f"<{count}d", data, at + 24)
+        lines.append(" ".join(map(str, (number, name, *size, *values))))
+        at += 24 + 8 * count
+    return "\n".join(lines)
 
 
 def colmap_cameras(text: str, file: str) -> Calibration:
@@ -390,8 +453,9 @@ def colmap_cameras(text: str, file: str) -> Calibration:
         if not words or words[0].startswith("#"):
             continue
         place = Position(file, k, 1, line)
-        if len(words) < 4:
-            refuse(place, "", "expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
+        if len(words) < 4 or not words[0].isdecimal():
+            fact = "expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS[] of COLMAP, or lines of KITTI"
+            refuse(place, "", fact)
         if words[0] in cameras:
             refuse(place, "CAMERA_ID", f"there are two cameras {words[0]}")
         cameras[words[0]] = attempt(partial(_colmap_camera, place, words[1:]))

@@ -68,6 +68,12 @@ def _load_lens(sensor: Node, lens: Node, field: str) -> dict[str, Node]:
     except ValueError as error:
         refuse((lens.get("camera") or file).position, f"{field}.lens.camera", str(error))
     _warn_of_swapped_size(camera, file.text)
+    if camera.unstated and lens.get("fisheye") is None:
+        message = (
+            f"{camera.position}: four coefficients count as k1 k2 p1 p2; state fisheye: true if "
+            "they are of OpenCV's fisheye module, which writes four, else fisheye: false"
+        )
+        warnings.warn(message, errors.ConfigWarning, stacklevel=3)
     _check_known_size(sensor, camera, f"{field}.lens.file", file)
     place = camera.position
     if asked.field_deg is not None and not camera.coefficients:

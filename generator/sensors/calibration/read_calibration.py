@@ -2,6 +2,8 @@
 
 import json
 import re
+import struct
+from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -10,11 +12,44 @@ from gen_data.config.yaml_tree import Node, parse_yaml
 from gen_data.core import errors, safe_xml
 from gen_data.sensors.calibration import frame_formats
 from gen_data.sensors.calibration.calibration import Calibration
-from gen_data.sensors.calibration.camera_formats import camera_file, colmap_cameras, kalibr_chain
+from gen_data.sensors.calibration.camera_formats import (
+    camera_file,
+    colmap_cameras,
+    colmap_text,
+    euroc_sensor,
+    kalibr_chain,
+)
+from gen_data.sensors.calibration.named_formats import named_cameras
 
 MAX_BYTES = 64 << 20
 _MAX_ELEMENTS = 100_000
+_MAX_NODES = 500_000
+"""Values of a file: of nerfstudio 19 for each of its images, of OpenCV 2 for each corner."""
 _TAG = re.compile(r"!!(opencv-[a-z-]+|[a-z]+)")
+_WRITE = "write camera_matrix and dist_coeffs with cv2.FileStorage"
+_TYPE = "type its fx_px, fy_px, cx_px and cy_px as intrinsics, and its coefficients as lens"
+_BEAMS = "list the elevations of its beams as elevations_deg, in the model of a lidar"
+_UNREAD: Mapping[bytes, tuple[str, str]] = {
+    rb"(?m)^\[image\]\s*$": ("a calibration of ROS as INI", "give ost.yaml of the same archive"),
+    rb"\A(PK\x03\x04|\x93NUMPY|\x80[\x02-\x05])": ("an archive of NumPy or Python", _WRITE),
+    rb"\A(MATLAB |\x89HDF)": ("a MAT-file", f"use cameraIntrinsicsToOpenCV, and {_WRITE}"),
+    rb"<(calibration|document)\b": ("XML of Metashape", "export the calibration as OpenCV"),
+    rb"\AParGroup": (
+        "a file of HALCON",
+        "undistort the images, and type Focus / Sx, Focus / Sy, Cx and Cy as intrinsics",
+    ),
+    rb"(?m)^model_type:\s*(MEI|SCARAMUZZA)": (
+        "a camera of camodocal without a lens here", "calibrate it as KANNALA_BRANDT",
+    ),
+    rb'"value0"': ("JSON of Basalt", _TYPE),
+    rb"\A(#usda|PXR-USDC)": (
+        "an OpenUSD stage", "type hfov_deg: 2 atan(horizontalAperture / (2 focalLength))",
+    ),
+    rb"\A(ARROW1|PAR1)": ("a table of Arrow, as of Argoverse", _TYPE),
+    rb"beam_altitude_angles": ("metadata of an Ouster scanner", _BEAMS),
+    rb"boost_serialization": ("a calibration of a Velodyne scanner", _BEAMS),
+}  # fmt: skip
+"""Formats that people have and that are not read here, by their first bytes: names, remedies."""
 _KITTI = re.compile(r"^(P\d|P_rect_\d\d|R|R0_rect|Tr_\w+|calib_time):", re.MULTILINE)
 
 
@@ -29,8 +64,15 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
     Raises:
         ConfigError: it cannot be read, or is of no known format.
     """
-    text = _text(path)
-    file, start = str(path), text.lstrip()[:200]
+    data, file = _read(path), str(path)
+    _refuse_unread(data, path)
+    if path.suffix.lower() == ".bin":
+        try:
+            return colmap_cameras(colmap_text(data), file)
+        except (ValueError, struct.error) as error:
+            raise errors.ConfigError(f"{path}: is not a cameras.bin of COLMAP ({error})") from None
+    text = _text(data, path)
+    start = text.lstrip()[:200]
     if start.startswith("<"):
         return _read_xml(text, path, fisheye=fisheye, rectified=rectified)
     if start.startswith("["):
@@ -42,15 +84,29 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
         if _KITTI.search(text):
             return frame_formats.kitti_calibration(text, file, rectified=rectified)
         return colmap_cameras(text, file)
-    root = parse_yaml(_plain_json(text) if start.startswith("{") else _plain_yaml(text), file)
+    plain = _plain_json(text) if start.startswith("{") else _plain_yaml(text)
+    root = parse_yaml(plain, file, _MAX_NODES)
+    return _read_tree(root, fisheye=fisheye, rectified=rectified)
+
+
+def _read_tree(root: Node, *, fisheye: bool, rectified: bool) -> Calibration:
     if any(node.get("camera_model") for node in root.entries.values()):
         return kalibr_chain(root)
+    if root.get("camera_model") and root.get("intrinsics"):
+        return euroc_sensor(root)
     if root.get("transforms") or root.get("child_frame_id"):
         return frame_formats.tf_frames(root)
-    return camera_file(root, fisheye=fisheye, rectified=rectified)
+    return named_cameras(root) or camera_file(root, fisheye=fisheye, rectified=rectified)
 
 
-def _text(path: Path) -> str:
+def _refuse_unread(data: bytes, path: Path) -> None:
+    """Raise ConfigError for formats that people have, but that are not read here."""
+    for pattern, (name, remedy) in _UNREAD.items():
+        if re.search(pattern, data[:4096]):
+            raise errors.ConfigError(f"{path}: is {name}, which is not read here; {remedy}")
+
+
+def _read(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
@@ -58,6 +114,10 @@ def _text(path: Path) -> str:
         raise errors.ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
     if len(data) > MAX_BYTES:
         raise errors.ConfigError(f"{path}: is larger than {MAX_BYTES >> 20} MiB")
+    return data
+
+
+def _text(data: bytes, path: Path) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -74,6 +134,7 @@ def _plain_yaml(text: str) -> str:
 
     Lines and columns stay.
     """
+    text = text.replace("\t", " ")
     text = re.sub(r"\A\s*%YAML[^\n]*", "", text)
     text = re.sub(r"\n(---|\.\.\.)\s*\Z", "\n", text)
     return _TAG.sub(lambda match: " " * len(match[0]), text)

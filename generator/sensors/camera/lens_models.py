@@ -91,8 +91,10 @@ class CalibratedLens(base_model.Strict):
             euroc_cam0; or tum_vi_cam0, a fisheye of 195 degrees. With one, a camera in it, such as
             cam0; empty = the only one.
         file: Name of a file of OpenCV (YAML, XML, JSON), ROS (camera_info), Kalibr (camera chain),
-            COLMAP (cameras.txt), nuScenes (calibrated_sensor.json) or KITTI.
-        fisheye: Whether the four coefficients of an OpenCV file belong to its fisheye model.
+            EuRoC (sensor.yaml), COLMAP (cameras.txt, cameras.bin), nerfstudio (transforms.json),
+            ORB-SLAM, camodocal (VINS), nuScenes (calibrated_sensor.json) or KITTI.
+        fisheye: Whether the four coefficients of an OpenCV file belong to its fisheye model; a
+            file that does not state it and a configuration without it cause a warning.
         rectified: Whether to take the rectified pinhole: the projection matrix of the file.
         field_deg: Full field of view, outside which the image is black; null = the whole range in
             which the model is valid.
