@@ -55,7 +55,7 @@ Target = tuple[NDArray[np.uint8], dict[str, Any]]
 def targets_of_cameras(sample: gen_data.Sample) -> list[Target]:
     """The photographs of all cameras of a sample."""
     cameras = (name for name, camera in sample.cameras.items() if "rgb" in camera.channels)
-    return [detection_target(sample, camera) for camera in cameras]
+    return [detection_target(sample, camera, ignored=True) for camera in cameras]
 
 
 def read_targets(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Iterator[Target]:

@@ -187,7 +187,10 @@ class Kitti(KittiLabels):
             write_text(folder / f"calib/{frame}.txt", calib)
             lidar = self._lidar(info)
             if sensor_selection.has_scans(shard_dir, lidar, sample.index):
-                points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
+                points = point_cloud_io.with_classes(
+                    point_cloud_io.read_points(shard_dir, lidar, sample.index),
+                    point_cloud_io.class_facts(info, sample.scene).get("classes"),
+                )
                 write_bytes(folder / f"velodyne/{frame}.bin", velodyne.scan_bytes(points, turn))
                 members, unseen = point_members(points, truth, rows, T_camera_lidar.matrix()[:3])
                 rows = without_returns(rows, unseen, truth)

@@ -231,13 +231,14 @@ class AppliedLabelMap:
 
         It has no images of category ids if the classes differ, as their pixels hold the data set's.
         """
-        if not self._has_classes:
+        if not self.has_classes:
             return self.dataset
         sensors = tuple(
             replace(s, channels=tuple(c for c in s.channels if c is not capture.Channel.CATEGORY))
             for s in self.dataset.sensors
         )
-        return replace(self.dataset, categories=tuple(self.label_map.classes_of), sensors=sensors)
+        classes = tuple(self.label_map.classes_of)
+        return replace(self.dataset, categories=classes, sensors=sensors, is_mapped=True)
 
     def map_sample(self, sample: Sample) -> Sample:
         """The sample with mapped labels."""
@@ -246,7 +247,8 @@ class AppliedLabelMap:
         return replace(sample, truth=truth, scene=self.map_scene(sample.scene), instants=instants)
 
     @property
-    def _has_classes(self) -> bool:
+    def has_classes(self) -> bool:
+        """Whether objects have other categories than in the data set."""
         return self.renames and self.label_map.classes is not None
 
     @cached_property
@@ -305,7 +307,7 @@ class AppliedLabelMap:
 
     def _map_instance(self, instance: Instance) -> Instance:
         """The instance under its class; ignored ones without a class have id 0."""
-        if not self._has_classes:
+        if not self.has_classes:
             return instance
         found = _find(instance, self._class_of)
         name, number = self._class_of.get(found, (instance.category, 0))

@@ -56,7 +56,13 @@ from gen_data.core.scene import Camera, Instance, Lidar
 from gen_data.core.scene_time import scene_at
 from gen_data.exporters import base, fragments
 from gen_data.exporters.conventions import POINT_TIME, Conventions
-from gen_data.exporters.point_cloud_io import PointTime, count_times_from, read_points
+from gen_data.exporters.point_cloud_io import (
+    PointTime,
+    class_facts,
+    count_times_from,
+    read_points,
+    with_classes,
+)
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames
 
 if TYPE_CHECKING:
@@ -124,7 +130,10 @@ class Mcap(base.ExporterBase):
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a line per sample: times, poses, calibrations and boxes."""
         self.check(info)
-        rows = (frame_facts(info, sample) | _frame_row(sample) for sample in samples)
+        rows = (
+            frame_facts(info, sample) | _frame_row(sample) | class_facts(info, sample.scene)
+            for sample in samples
+        )
         write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -425,8 +434,10 @@ def _annotations_message(boxes: Iterable[Sequence[Any]], time_ns: int) -> Messag
 def _cloud_message(event: _Event, point_time: PointTime) -> Message:
     from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 
-    stored = read_points(event.frame.shard_dir, event.key, event.frame.index)
-    points = count_times_from(point_time, stored, event.frame.row["lidars"][event.key][1])
+    frame = event.frame
+    stored = read_points(frame.shard_dir, event.key, frame.index)
+    points = count_times_from(point_time, stored, frame.row["lidars"][event.key][1])
+    points = with_classes(points, frame.row.get("classes"))
     return PointCloud(
         timestamp=_timestamp(event.time_ns),
         frame_id=f"lidar/{event.key}",

@@ -4,8 +4,9 @@
 Exporters make their own files from these.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,33 @@ def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
     if points.dtype != capture.POINT:
         raise errors.StorageError(f"{path}: contains no laser points; generate the data set again")
     return points
+
+
+def class_facts(info: interfaces.DatasetInfo, scene: scene.Scene) -> dict[str, Any]:
+    """Key ``classes`` of a frame's line: classes by instance id, if a label map has others."""
+    if not info.is_mapped:
+        return {}
+    return {"classes": {str(i.instance_id): i.category_id for i in scene.instances}}
+
+
+def with_classes(records: NDArray[np.void], classes: Mapping[str, int] | None) -> NDArray[np.void]:
+    """Points, or rows of a device, with the category ids of ``class_facts``; None = their own.
+
+    Stored ids are of the data set's categories, which a label map merges, divides and orders.
+    """
+    columns = records.dtype.names or ()
+    if classes is None or not {"instance_id", "category_id"} <= {*columns}:
+        return records
+    mapped: NDArray[np.void] = records.copy()
+    mapped["category_id"] = class_table(classes)[records["instance_id"]]
+    return mapped
+
+
+def class_table(classes: Mapping[str, int]) -> NDArray[np.uint16]:
+    """Class of every instance id, [65536]; 0 = none."""
+    table = np.zeros(1 + np.iinfo(np.uint16).max, np.uint16)
+    table[[int(number) for number in classes]] = [*classes.values()]
+    return table
 
 
 def count_times_from(base: PointTime, points: NDArray[np.void], sweep_s: float) -> NDArray[np.void]:

@@ -158,6 +158,7 @@ def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
             for name, cloud in sorted(sample.capture.clouds.items())
         },
         **rerun_labels.frame_row(sample.frame, sample.scene),
+        **point_cloud_io.class_facts(info, sample.scene),
     }
 
 
@@ -402,7 +403,11 @@ def _lidar_chunks(info: DatasetInfo, name: str, rows: Sequence[Row]) -> Iterator
 
     path = f"world/lidars/{name}"
     yield _poses(info, path, rows)
-    points = [point_cloud_io.read_points(row["shard"], name, row["index"]) for row in rows]
+    stored = (point_cloud_io.read_points(row["shard"], name, row["index"]) for row in rows)
+    points = [
+        point_cloud_io.with_classes(scan, row.get("classes"))
+        for scan, row in zip(stored, rows, strict=True)
+    ]
     joined = np.concatenate(points)
     if len(joined):
         columns = rr.Points3D.columns(

@@ -34,6 +34,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.core import errors, serialization
@@ -42,6 +43,7 @@ from gen_data.core.reported import reported, reported_s
 from gen_data.core.sample import Sample
 from gen_data.exporters import base, coco, fragments, sensor_selection, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
+from gen_data.exporters.point_cloud_io import class_facts, with_classes
 
 SAMPLES = "samples"
 
@@ -85,7 +87,10 @@ class WebDataset(base.ExporterBase):
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write one JSON line per sample: its labels."""
         self.check(info)
-        rows = ({"split": s.split, "labels": sample_labels(info, s)} for s in samples)
+        rows = (
+            {"split": s.split, "labels": sample_labels(info, s), **class_facts(info, s.scene)}
+            for s in samples
+        )
         fragments.write_fragment(shard_dir / self.type, SAMPLES, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -98,7 +103,7 @@ class WebDataset(base.ExporterBase):
                     stem = "_".join(info.name.split())
                     tars[split] = _TarFiles(dataset_dir / split / stem, self.samples_per_tar)
                 key = f"{labels['index']:09d}"
-                tars[split].add(key, _fields(info, shard_dir, labels))
+                tars[split].add(key, _fields(info, shard_dir, labels, row.get("classes")))
         finally:
             for files in tars.values():
                 files.close()
@@ -129,7 +134,10 @@ def sample_labels(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
 
 
 def _fields(
-    info: DatasetInfo, shard_dir: Path, labels: Mapping[str, Any]
+    info: DatasetInfo,
+    shard_dir: Path,
+    labels: Mapping[str, Any],
+    classes: Mapping[str, int] | None,
 ) -> Iterator[tuple[str, bytes]]:
     """Yield name and bytes of each field of a sample, sorted by name."""
     index = labels["index"]
@@ -153,7 +161,8 @@ def _fields(
     fields: dict[str, bytes] = {}
     for name, path in paths.items():
         if path.suffix == ".npy":
-            columns[name.lower()], fields[name] = _plain_npy(path)
+            records = with_classes(np.load(path, allow_pickle=False), classes)
+            columns[name.lower()], fields[name] = _plain_npy(records)
         else:
             fields[name] = path.read_bytes()
     fields["json"] = serialization.canonical_json({**labels, "columns": columns}).encode()
@@ -161,16 +170,17 @@ def _fields(
         yield name.lower(), fields[name]
 
 
-def _plain_npy(path: Path) -> tuple[list[str], bytes]:
+def _plain_npy(records: NDArray[np.void]) -> tuple[list[str], bytes]:
     """Names of the columns of an array of records, and the matrix as a file."""
-    records = np.load(path, allow_pickle=False)
     columns = [
         name if not shape else f"{name}[{k}]"
-        for name in records.dtype.names
+        for name in records.dtype.names or ()
         for shape in (records.dtype[name].shape,)
         for k in range(math.prod(shape))
     ]
-    exact = all(np.can_cast(records.dtype[name].base, np.float32) for name in records.dtype.names)
+    exact = all(
+        np.can_cast(records.dtype[name].base, np.float32) for name in records.dtype.names or ()
+    )
     matrix = structured_to_unstructured(records, np.float32 if exact else np.float64)
     file = io.BytesIO()
     np.save(file, matrix, allow_pickle=False)

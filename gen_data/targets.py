@@ -5,7 +5,9 @@ tensors. A target has one camera, the first with a colour image unless ``camera`
 ``functools.partial(detection_target, camera="right")``. Images are [3, height, width], uint8, RGB.
 Boxes, masks, labels and keypoints have the names, types and conventions of torchvision's reference
 training: boxes are ``x_min, y_min, x_max, y_max`` in pixels, half-open; label 0 is background,
-label ``k`` the ``k``-th category.
+label ``k`` the ``k``-th category. Objects that a label map ignores are left out, as torchvision's
+reference leaves out crowds: its detectors would learn them. ``ignored=True`` keeps them, for losses
+that mask them: ``iscrowd`` is 1, and the label 0 if the map has no class for them.
 """
 
 import math
@@ -33,26 +35,30 @@ def image_target(sample: Sample, camera: str = "") -> NDArray[np.uint8]:
     return _channels_first(_camera(sample, camera).rgb)
 
 
-def detection_target(sample: Sample, camera: str = "") -> tuple[NDArray[np.uint8], Arrays]:
+def detection_target(
+    sample: Sample, camera: str = "", *, ignored: bool = False
+) -> tuple[NDArray[np.uint8], Arrays]:
     """Image and boxes of the visible annotated objects.
 
     Returns:
         The image, and ``boxes`` float32 [n, 4], ``labels`` int64 [n], ``area`` float32 [n],
-        ``iscrowd`` int64 [n]: 1 for objects that a label map ignores, which training leaves out;
+        ``iscrowd`` int64 [n]: 1 for ignored objects;
         ``image_id`` int64 []: the image's id in the COCO export, unique among all cameras.
     """
     reading = _camera(sample, camera)
-    return _channels_first(reading.rgb), _boxes(sample, reading, _visible(reading))
+    return _channels_first(reading.rgb), _boxes(sample, reading, _visible(reading, ignored))
 
 
-def segmentation_target(sample: Sample, camera: str = "") -> tuple[NDArray[np.uint8], Arrays]:
+def segmentation_target(
+    sample: Sample, camera: str = "", *, ignored: bool = False
+) -> tuple[NDArray[np.uint8], Arrays]:
     """As ``detection_target``, with ``masks`` uint8 [n, height, width] of the visible pixels.
 
     Raises:
         ConfigError: the camera writes no instance ids.
     """
     reading = _camera(sample, camera)
-    objects = _visible(reading)
+    objects = _visible(reading, ignored)
     ids = _channel(reading, "instance")
     numbers = np.array([thing.instance.instance_id for thing in objects], ids.dtype)
     masks = (ids == numbers[:, None, None]).astype(np.uint8)
@@ -60,7 +66,7 @@ def segmentation_target(sample: Sample, camera: str = "") -> tuple[NDArray[np.ui
 
 
 def keypoint_target(
-    sample: Sample, camera: str = "", category: str = ""
+    sample: Sample, camera: str = "", category: str = "", *, ignored: bool = False
 ) -> tuple[NDArray[np.uint8], Arrays]:
     """As ``detection_target`` for the objects of one category with keypoints.
 
@@ -71,6 +77,7 @@ def keypoint_target(
         sample: The sample.
         camera: Name of the camera; empty = the first one with a colour image.
         category: Name of the category; empty = all, which must have one skeleton.
+        ignored: Whether to keep objects that a label map ignores.
 
     Raises:
         ConfigError: objects have several skeletons, whose points a model would mix up:
@@ -79,7 +86,7 @@ def keypoint_target(
     reading = _camera(sample, camera)
     jointed = [
         thing
-        for thing in _visible(reading)
+        for thing in _visible(reading, ignored)
         if thing.keypoints and category in ("", thing.instance.category)
     ]
     kinds = {find_skeleton([p.name for p in thing.keypoints or ()]) for thing in jointed}
@@ -198,8 +205,12 @@ def _channels_first(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(np.moveaxis(rgb, -1, 0))
 
 
-def _visible(reading: CameraReading) -> list[ObjectTruth]:
-    return [t for t in reading.objects if t.instance.annotated and t.box is not None]
+def _visible(reading: CameraReading, ignored: bool) -> list[ObjectTruth]:
+    return [
+        thing
+        for thing in reading.objects
+        if thing.instance.annotated and thing.box is not None and (ignored or not thing.ignored)
+    ]
 
 
 def _boxes(sample: Sample, reading: CameraReading, objects: Sequence[ObjectTruth]) -> Arrays:

@@ -1,14 +1,16 @@
 """Samples whose labels a label map has changed."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import NDArray
+
 from gen_data.api.config import read_document, read_model
 from gen_data.api.sample import SampleRecord, SampleSource
-from gen_data.core.capture import Capture
+from gen_data.core.capture import Capture, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import EgoTruth, ImageTruth
@@ -43,10 +45,34 @@ class RelabelledSample:
         """Names of all cameras of the data set."""
         return self.record.cameras
 
-    @property
+    @cached_property
     def capture(self) -> Capture:
-        """Readings of all sensors."""
-        return self.record.capture
+        """Readings of all sensors; category ids are the classes of instances."""
+        from gen_data.exporters.point_cloud_io import class_facts, with_classes
+        from gen_data.runner.stored import ReadOnAccess
+
+        read = self.record.capture
+        classes = class_facts(self.applied.info, self.scene).get("classes")
+        if classes is None:
+            return read
+
+        def reading(name: str) -> SensorReading:
+            images = ClassImages(read.readings[name].channels, classes)
+            return replace(read.readings[name], channels=images)
+
+        def cloud(name: str) -> PointCloud:
+            found = read.clouds[name]
+            return replace(found, points=with_classes(found.points, classes))
+
+        def table(name: str) -> Measurements:
+            found = read.tables[name]
+            return replace(found, rows=with_classes(found.rows, classes))
+
+        return Capture(
+            ReadOnAccess(read.readings, reading),
+            ReadOnAccess(read.clouds, cloud),
+            ReadOnAccess(read.tables, table),
+        )
 
     @property
     def frame(self) -> EgoTruth | None:
@@ -62,6 +88,39 @@ class RelabelledSample:
     def scene(self) -> Scene:
         """The world with mapped instances."""
         return self.applied.map_scene(self.record.scene)
+
+
+class ClassImages(Mapping[Channel, NDArray[Any]]):
+    """Images of a camera whose category ids are the classes of instances.
+
+    There are none of a camera without instance ids, as stored ones are of other categories.
+    """
+
+    def __init__(self, images: Mapping[Channel, NDArray[Any]], classes: Mapping[str, int]) -> None:
+        self._images, self._classes = images, classes
+        known = tuple(images)
+        self._channels = tuple(
+            c for c in known if c is not Channel.CATEGORY or Channel.INSTANCE in known
+        )
+
+    def __getitem__(self, channel: Channel) -> NDArray[Any]:
+        """Decode one image."""
+        from gen_data.exporters.point_cloud_io import class_table
+
+        if channel is not Channel.CATEGORY:
+            return self._images[channel]
+        if channel not in self._channels:
+            raise KeyError(channel)
+        classes: NDArray[Any] = class_table(self._classes)[self._images[Channel.INSTANCE]]
+        return classes
+
+    def __iter__(self) -> Iterator[Channel]:
+        """The channels, in order."""
+        return iter(self._channels)
+
+    def __len__(self) -> int:
+        """Number of channels."""
+        return len(self._channels)
 
 
 @dataclass(frozen=True)

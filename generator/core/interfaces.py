@@ -639,6 +639,8 @@ class DatasetInfo:
         step_s: Time between them [s].
         twins: Whether each view is there twice, with another demonstration.
         publication: Title, licence and creators.
+        is_mapped: Whether the categories are the classes of a label map: stored images and points
+            have other ids.
     """
 
     name: str
@@ -652,6 +654,7 @@ class DatasetInfo:
     step_s: float = 0.1
     publication: Publication = Publication()
     twins: bool = False
+    is_mapped: bool = False
 
     def view_streams(self, scene: int, view: int, attempt: int) -> streams.Streams:
         """Random streams that draw a view of a scene: the same for twins."""

@@ -139,10 +139,11 @@ def _photographs(samples: SampleSequence) -> Iterator[tuple[Sample, str]]:
 def _read_truth(samples: SampleSequence, data: Path) -> tuple[RealSet, dict[int, int]]:
     """Objects in all photographs, under the image ids of COCO exports, and samples by these ids."""
     pictures, sample_of = [], {}
+    names = ("", *samples.categories)
     for sample, camera in _photographs(samples):
-        image, target = detection_target(sample, camera)
+        image, target = detection_target(sample, camera, ignored=True)
         things = tuple(
-            RealObject(samples.categories[int(label) - 1], _sides(box), bool(crowd))
+            RealObject(names[int(label)], _sides(box), bool(crowd))
             for box, label, crowd in zip(
                 target["boxes"], target["labels"], target["iscrowd"], strict=True
             )

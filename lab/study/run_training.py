@@ -57,9 +57,10 @@ def _generated(folder: Path, classes: list[str], longest_px: float) -> list[Targ
         has_map = bool((stored.config.get("labels") or {}).get("map"))
         samples = stored.relabelled() if has_map else stored
         label = {k: classes.index(name) + 1 for k, name in enumerate(samples.categories, 1)}
+        label[0] = 0  # ignored objects without a class
         targets: list[Target] = []
         for sample in samples:
-            image, arrays = shrink(detection_target(sample), longest_px)
+            image, arrays = shrink(detection_target(sample, ignored=True), longest_px)
             labels = [label[int(k)] for k in arrays["labels"]]
             targets.append((image, {**arrays, "labels": np.array(labels, np.int64)}))
     return targets

@@ -17,6 +17,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.serialization import to_plain
 from gen_data.exporters.image_files import SIGNED_ZERO, encode_channel, read_image
 from gen_data.runner.processes import START_WORKER
+from gen_data.targets import detection_target, lidar_target, segmentation_target, semantic_target
 from tests.end_to_end.running import environment
 
 SMALL = (
@@ -306,9 +307,43 @@ def test_relabelled_samples_have_the_classes_of_the_map(stored: gen_data.StoredD
         stored.relabelled()
     with pytest.raises(gen_data.ConfigError, match=r"<label map>:1:\d+: classess: unknown key"):
         stored.relabelled({"classess": {}})
-    # ``iscrowd`` is 1, as for COCO's regions that training leaves out.
+
+
+def test_category_ids_of_pixels_and_points_are_the_classes_of_the_map(
+    stored: gen_data.StoredDataset,
+) -> None:
+    """Of the instances that the map has; 0 for all others, such as the rest of a category."""
+    names = sorted({b.category for b in stored[0].boxes2d["color"]})
+    mapped = stored.relabelled({"classes": {"second": names[1], "first": [names[0]]}})
+    plain, one = stored[0], mapped[0]
+    class_of = {b.instance_id: b.category_id for b in one.boxes2d["color"]}
+    assert set(class_of.values()) == {1, 2}
+    ids = plain.cameras["color"].instance_ids
+    expected = np.vectorize(lambda number: class_of.get(number, 0))(ids)
+    assert np.array_equal(semantic_target(one)[1], expected)
+    (cloud,), (former,) = one.lidars.values(), plain.lidars.values()
+    expected = np.vectorize(lambda number: class_of.get(number, 0))(former.points["instance_id"])
+    seen = np.isin(former.points["instance_id"], [0, *class_of])
+    assert np.array_equal(cloud.points["category_id"][seen], expected[seen])
+    assert {1, 2} <= {*cloud.points["category_id"].tolist()}
+    assert np.array_equal(cloud.points["position_m"], former.points["position_m"])
+
+
+def test_targets_leave_out_ignored_objects_which_detectors_would_learn(
+    stored: gen_data.StoredDataset,
+) -> None:
+    """Or keep them with COCO's mark of regions that training leaves out."""
     name = stored[0].boxes2d["color"][0].category
-    _, target = gen_data.targets.detection_target(stored.relabelled({"ignore": [name]})[0])
+    sample = stored.relabelled({"ignore": [name]})[0]
     ignored = [box.category == name for box in stored[0].boxes2d["color"]]
     assert 0 < sum(ignored) < len(ignored)
-    assert target["iscrowd"].tolist() == [int(flag) for flag in ignored]
+    _, kept = detection_target(sample, ignored=True)
+    assert kept["iscrowd"].tolist() == [int(flag) for flag in ignored]
+    for find in (detection_target, segmentation_target):
+        _, target = find(sample)
+        assert not target["iscrowd"].any()
+        counting = np.flatnonzero(np.logical_not(ignored))
+        assert target["boxes"].tolist() == kept["boxes"][counting].tolist()
+    number = 1 + stored.categories.index(name)
+    assert number in lidar_target(stored[0])[1]["labels"]
+    assert number not in lidar_target(sample)[1]["labels"]
