@@ -114,6 +114,10 @@ class ClassImages(Mapping[Channel, NDArray[Any]]):
         classes: NDArray[Any] = class_table(self._classes)[self._images[Channel.INSTANCE]]
         return classes
 
+    def __contains__(self, channel: object) -> bool:
+        """Whether there is such an image; decodes nothing."""
+        return channel in self._channels
+
     def __iter__(self) -> Iterator[Channel]:
         """The channels, in order."""
         return iter(self._channels)

@@ -40,6 +40,20 @@ def test_temporary_folders_have_a_lock() -> None:
     assert not bare
 
 
+def test_mappings_answer_whether_a_key_is_there_without_its_value() -> None:
+    """``Mapping`` answers ``in`` by ``__getitem__``, which decodes an image or renders a sample."""
+    costly = [
+        f"{path.relative_to(ROOT)}: {node.name}"
+        for path in python_files(*OURS)
+        if "(Mapping[" in (source := path.read_text())
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.ClassDef)
+        and any(ast.unparse(base).startswith("Mapping[") for base in node.bases)
+        and "__contains__" not in {f.name for f in node.body if isinstance(f, ast.FunctionDef)}
+    ]
+    assert not costly
+
+
 def functions_in(node: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
     """Functions among the statements of a module, nested ones included."""
     for child in ast.iter_child_nodes(node):
