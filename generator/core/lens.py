@@ -86,6 +86,12 @@ class Lens:
         # Tangential terms may fold by themselves.
         return _profile(self).folds or (whole and any(self.coefficients[2:4]))
 
+    @property
+    def fold_rad(self) -> float | None:
+        """Angle to the axis at which its radial polynomial folds over; None if it never does."""
+        profile = _profile(self) if self.coefficients else None
+        return profile.end_rad if profile and profile.folds else None
+
     def radius(self, angle_rad: float) -> float:
         """Distance from the axis, on the plane, of the image of an angle to the axis.
 

@@ -6,6 +6,7 @@ files, or by hand.
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -389,7 +390,9 @@ def test_the_field_of_a_calibrated_fisheye_can_end_before_its_polynomial_folds(
     """As of a circular fisheye: corners of the image are black, and need no valid polynomial."""
     D = np.array([0.0034, 0.0007, -0.02, 0.0002])
     content = (ROS % ("equidistant", 4, D.tolist())).replace("812.4", "190").replace("811.9", "190")
-    assert "folds over inside the image" in told(tmp_path, LENS, content=content)
+    message = told(tmp_path, LENS, content=content)
+    (widest,) = re.findall(r"folds over inside the image.* field_deg of at most ([\d.]+)", message)
+    sensor(tmp_path, LENS.replace("}", f", field_deg: {widest}}}"), content=content)
     limited = LENS.replace("}", ", field_deg: 150}")
     found = sensor(tmp_path, limited, content=content).nominal_intrinsics()
 
@@ -561,6 +564,18 @@ def test_frames_of_ros_and_links_of_a_urdf_are_optical_by_their_names(
 
     assert found.offset_m == pytest.approx((1.0, 0.2, 0.5))
     assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == pytest.approx(angles_deg)
+
+
+def test_transforms_that_ros_prints_one_after_the_other_are_read_together(tmp_path: Path) -> None:
+    """``ros2 topic echo /tf_static`` prints the message of each node that publishes some."""
+    first, second = TF.partition("- header")[::2]
+    one, other = second.split("- header")
+    content = f"{first}- header{one}---\n{first}- header{other}"
+    found = mounted(tmp_path, "frame: camera_optical_frame", "tf.yaml", content)
+    assert found == mounted(tmp_path, "frame: camera_optical_frame", "tf.yaml", TF)
+    broken = content.replace("z: -0.5", "z: one")
+    text = "rig: r, mounting: {file: FILE, frame: camera_link}"
+    assert told(tmp_path, text, "tf.yaml", content=broken).startswith("tf.yaml:9:")
 
 
 def test_axes_can_be_stated_where_a_name_misleads(tmp_path: Path) -> None:
@@ -830,6 +845,8 @@ FAULTS = [
     *((LENS, "cameras.txt", f"1 OPENCV 640 512 800 800 {words} 0 0 0\n",
        f"cameras.txt:1:1: expected numbers after the model ({word} is not a finite number)")
       for words, word in (("nan 256 0.1", "nan"), ("320 256 -inf", "-inf"))),
+    (LENS, "a.xml", "<opencv_storage><K>1 2</K>\n <K>1 2</K></opencv_storage>",
+     "a.xml:2:2: K: is stated twice"),
     (LENS, "cameras.txt", 2 * "1 PINHOLE 640 512 800 800 320 256\n",
      "cameras.txt:2:1: CAMERA_ID: there are two cameras 1"),
     (LENS.replace("}", ", fisheye: true}"), "camera.yaml", ROS % ("plumb_bob", 4, D4.tolist()),

@@ -181,6 +181,7 @@ UNREAD: list[Any] = [
     ("cameras.bin", b"", "is not a cameras.bin of COLMAP (unpack_from requires"),
     ("ost.txt", b"# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n", "give ost.yaml"),
     ("a.ini", b"[image]\n\n# comment\nwidth\n640\n", "is a calibration of ROS as INI, which"),
+    ("SN1.conf", b"[LEFT_CAM_HD]\nfx=700.1\n", "is an INI file, as of ZED cameras, which is not"),
     ("results-cam.txt", b"Calibration results\n===\n", ":1:1: expected CAMERA_ID MODEL WIDTH"),
     ("cam_to_pose.txt", b"image_00: 0.03 -0.09 0.99 1.5\n", ":1:1: expected CAMERA_ID MODEL WIDTH"),
     ("a.npz", b"PK\x03\x04\x00", "is an archive of NumPy or Python, which is not read here; write"),
@@ -192,8 +193,8 @@ UNREAD: list[Any] = [
     ("a.feather", b"ARROW1\x00\x00", "is a table of Arrow, as of Argoverse, which is not read"),
     ("a.json", b'{"beam_altitude_angles": [1.0]}', "is metadata of an Ouster scanner, which"),
     ("a.yaml", b"%YAML:1.0\n---\nmodel_type: MEI\n", "camodocal without a lens here, which is not"),
-    ("a.yaml", b"a: 1\n", "no camera found; expected a camera matrix such as K, camera_"
-     "matrix or M1; of other formats, type fx_px, fy_px, cx_px and cy_px as intrinsics"),
+    ("a.yaml", b"a: 1\n", "no camera found; expected a camera matrix such as K, camera_matrix or M1"
+     ", or R and T of a pair; of other formats, type fx_px, fy_px, cx_px, cy_px as intrinsics"),
     ("a.json", nerf("EQUIRECTANGULAR").encode(), "a.json:2:18: camera_model: 'EQUIRECTANGULAR' has "
      "no lens here; expected one of OPENCV, PINHOLE"),
     ("a.json", nerf("OPENCV", k4=0.1).encode(), "a.json:9:8: k4: other than 0 has no lens here"),

@@ -39,8 +39,11 @@ ROWS: list[tuple[str, dict[str, Any], str]] = [
     ("depth_camera", {"layers": 4}, "no channel has any; add one of depth_layers"),
     ("rgb_camera", {"hfov_deg": 180.0}, "hfov_deg"),
     ("rgb_camera", {"hfov_deg": 175}, "too wide for a pinhole"),
-    ("rgb_camera", {"lens": {"model": "brown_conrady", "k1": -0.9}}, FOLDS),
-    ("rgb_camera", {"lens": {"model": "kannala_brandt", "k1": -0.3}, "hfov_deg": 100}, FOLDS),
+    ("rgb_camera", {"lens": {"model": "brown_conrady", "k1": -0.9}},
+     # Slopes 1 + 3 k1 r^2 and 1 + 3 k1 t^2 are 0 at tan(31.324 degrees) and at 60.395 degrees.
+     f"{FOLDS}.* with field_deg of at most 62.6"),
+    ("rgb_camera", {"lens": {"model": "kannala_brandt", "k1": -0.3}, "hfov_deg": 100},
+     f"{FOLDS}.* with field_deg of at most 120.7"),
     ("rgb_camera", {"lens": {"model": "brown_conrady"}, "hfov_deg": 190},
      "nothing at 95 degrees from its axis"),
     ("rgb_camera", {"lens": {"model": "kannala_brandt", "p1": 0.1}}, "p1"),

@@ -157,8 +157,8 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
         frames = _pair_frames(entries)
     if not cameras and not frames:
         known = "projection matrix such as P" if rectified else "camera matrix such as K"
-        fact = f"no camera found; expected a {known}, {_MATRICES[0]} or M1; of other formats, type"
-        fail(root, "", f"{fact} fx_px, fy_px, cx_px and cy_px as intrinsics")
+        fact = f"no camera found; expected a {known}, {_MATRICES[0]} or M1, or R and T of a pair; "
+        fail(root, "", f"{fact}of other formats, type fx_px, fy_px, cx_px, cy_px as intrinsics")
     if "2" in cameras and not rectified:
         frames = _pair_frames(entries)
     kind, choices = "a calibration of OpenCV or ROS", {"fisheye", "rectified"}

@@ -31,6 +31,7 @@ _TYPE = "type its fx_px, fy_px, cx_px and cy_px as intrinsics, and its coefficie
 _BEAMS = "list the elevations of its beams as elevations_deg, in the model of a lidar"
 _UNREAD: Mapping[bytes, tuple[str, str]] = {
     rb"(?m)^\[image\]\s*$": ("a calibration of ROS as INI", "give ost.yaml of the same archive"),
+    rb"\A\s*\[[A-Za-z]\w*\]\s": ("an INI file, as of ZED cameras", _TYPE),
     rb"\A(PK\x03\x04|\x93NUMPY|\x80[\x02-\x05])": ("an archive of NumPy or Python", _WRITE),
     rb"\A(MATLAB |\x89HDF)": ("a MAT-file", f"use cameraIntrinsicsToOpenCV, and {_WRITE}"),
     rb"<(calibration|document)\b": ("XML of Metashape", "export the calibration as OpenCV"),
@@ -132,8 +133,9 @@ def _plain_json(text: str) -> str:
 def _plain_yaml(text: str) -> str:
     """YAML without the syntax of OpenCV and ROS: ``%YAML:1.0``, tags, an empty last document.
 
-    Lines and columns stay.
+    Lines and columns stay. Transforms that ROS prints one after the other are one list.
     """
+    text = re.sub(r"\n---[ \t]*\ntransforms:[ \t]*(?=\n)", "\n\n", text)
     text = text.replace("\t", " ")
     text = re.sub(r"\A\s*%YAML[^\n]*", "", text)
     text = re.sub(r"\n(---|\.\.\.)\s*\Z", "\n", text)
@@ -159,7 +161,13 @@ def _storage(element: Element, file: str) -> Node:
     assert isinstance(element, safe_xml.PlacedElement)
     place = problems.Position(file, element.line, element.column)
     if len(element):
-        return Node(place, {child.tag: _storage(child, file) for child in element})
+        entries: dict[str, Node] = {}
+        for child in element:
+            node = _storage(child, file)
+            if child.tag in entries and child.tag != "_":
+                problems.refuse(node.position, child.tag, "is stated twice")
+            entries[child.tag] = node
+        return Node(place, entries)
     text = (element.text or "").strip()
     words = text.split()
     if len(words) != 1 and all(_is_number(word) for word in words):

@@ -19,6 +19,7 @@ from gen_data.core.capture import (
 )
 from gen_data.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
 from gen_data.core.scene import Camera, Region, Scene
 from gen_data.core.shutter import INSTANT, Shutter
 from gen_data.core.stereo import baseline_m, disparity_px, is_seen_by_both
@@ -138,7 +139,7 @@ class RgbCamera(Mounted):
             raise ValueError(
                 f"lens {self.lens.model}: its polynomial folds over inside the image; check the "
                 "signs and magnitudes of its coefficients, reduce hfov_deg, or limit its field "
-                "with field_deg"
+                f"with field_deg{_widest_field(self.nominal_intrinsics().lens)}"
             )
         return self
 
@@ -305,3 +306,10 @@ def _nominal_pose(focus: Region, half_angle_rad: float) -> se3.SE3:
         z + distance_m * math.sin(NOMINAL_ELEVATION_RAD),
     )
     return se3.look_at(eye, focus.center_m).rounded()
+
+
+def _widest_field(lens: Lens) -> str:
+    """The largest field of view of a lens before its radial polynomial folds over, in words."""
+    if lens.fold_rad is None:
+        return ""
+    return f" of at most {math.floor(20.0 * math.degrees(lens.fold_rad)) / 10.0:g}"
