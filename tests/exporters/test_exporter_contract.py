@@ -17,7 +17,7 @@ from tests.tiers import sampled
 
 PACKED = {"huggingface", "map_vectors", "opendrive", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
-EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
+EVERY_CLASS = {"coco", "tfrecord", "voc", "webdataset"}
 """Formats with regions that a score leaves out class by class; see ``test_ignored_objects``."""
 NO_CLASS = {"cityscapes", "hdf5", "kitti", "kitti_tracking", "language", "motchallenge"}
 """Formats with a mark for ignored objects that needs no class, or that only mention them."""

@@ -59,7 +59,9 @@ def test_groups_are_bounded(world: Any, tmp_path: Path, monkeypatch: pytest.Monk
     assert by_bytes.num_row_groups == 5
 
 
-def test_flow_is_binary_what_is_missing_null_and_ignored_crowds(world: Any, tmp_path: Path) -> None:
+def test_flow_is_binary_missing_values_null_and_ignored_left_out(
+    world: Any, tmp_path: Path
+) -> None:
     """Pillow would decode flow to 8 bits; the right camera writes none."""
     info, samples = world.pairs()
     folder = world.export(HuggingFace(), info, samples, tmp_path / "pairs")
@@ -73,7 +75,9 @@ def test_flow_is_binary_what_is_missing_null_and_ignored_crowds(world: Any, tmp_
     ignored = world.ignoring(world.samples[0])
     folder = world.export(HuggingFace(), world.info(1), [ignored], tmp_path)
     (row,) = parquet(folder / "data/train-00000-of-00001.parquet").to_pylist()
-    assert row["objects"]["iscrowd"] == [True] + [False] * (len(row["objects"]["id"]) - 1)
+    _, *others = ignored.truth["color"].objects
+    assert row["objects"]["instance_id"] == [t.instance.instance_id for t in others]
+    assert not any(row["objects"]["iscrowd"])
 
 
 def card(folder: Path) -> Any:
