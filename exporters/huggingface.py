@@ -64,6 +64,8 @@ if TYPE_CHECKING:
 
 IMAGES = "images"
 DECIMALS = 9
+SPLIT_NAMES = {"val": "validation"}
+"""Names in ``datasets``; scripts that find none of this name split the training set at random."""
 GROUP_BYTES = 64_000_000
 """Image bytes of a row group after which the next one begins."""
 WIDE = frozenset(
@@ -140,12 +142,19 @@ class HuggingFace(base.ExporterBase):
             "configs": [
                 {
                     "config_name": "default",
-                    "data_files": [{"split": split, "path": f"data/{split}-*"} for split in splits],
+                    "data_files": [
+                        {"split": SPLIT_NAMES.get(split, split), "path": f"data/{split}-*"}
+                        for split in splits
+                    ],
                 }
             ],
             "dataset_info": {
                 "splits": [
-                    {"name": split, "num_bytes": files.bytes, "num_examples": files.total}
+                    {
+                        "name": SPLIT_NAMES.get(split, split),
+                        "num_bytes": files.bytes,
+                        "num_examples": files.total,
+                    }
                     for split, files in splits.items()
                 ],
                 "download_size": sum(files.size_bytes() for files in splits.values()),

@@ -39,9 +39,10 @@ def test_parquet_files_embed_images_and_name_and_card_count_them(dataset: Path, 
     facts = card(dataset)
     assert facts["license"] == "other"
     (files,) = (config["data_files"] for config in facts["configs"])
-    assert files == [{"split": s, "path": f"data/{s}-*"} for s in ("train", "val")]
+    named = {"train": "train", "validation": "val"}
+    assert files == [{"split": k, "path": f"data/{s}-*"} for k, s in named.items()]
     splits = facts["dataset_info"]["splits"]
-    assert [(s["name"], s["num_examples"]) for s in splits] == [("train", 5), ("val", 2)]
+    assert [(s["name"], s["num_examples"]) for s in splits] == [("train", 5), ("validation", 2)]
     assert all(s["num_bytes"] > 1000 for s in splits)
     sizes = [p.stat().st_size for p in (dataset / "data").iterdir()]
     assert facts["dataset_info"]["download_size"] == sum(sizes)
