@@ -29,7 +29,7 @@ OWN_IMAGES = PACKED | {
 TRACKS = {"argoverse2", "nuscenes"}
 """Formats of tracks, from which an ignored object disappears and a missing one does not."""
 WITHOUT_OBJECTS = {
-    "birdseye", "calibration", "culane", "graspnet", "kitti_stereo", "lerobot", "lidar_flow",
+    "calibration", "culane", "graspnet", "kitti_stereo", "lerobot", "lidar_flow",
     "map_vectors", "opendrive", "openlane", "rlds", "scannet", "scene_text", "semantickitti",
     "tables", "tapvid", "tum_rgbd",
 }  # fmt: skip
