@@ -132,9 +132,7 @@ def test_only_formats_with_a_mark_have_ignored_objects_with_or_without_a_class(
         files(world.export(MappedExporter(exporter, m), info, samples[:1], tmp_path / m.others))
         for m in maps
     )
-    # Panoptic images have stuff where objects were dropped.
-    differing = EVERY_CLASS | NO_CLASS | {"coco_panoptic"}
-    assert (dropped != ignored) == (exporter.type in differing)
+    assert (dropped != ignored) == (exporter.type in EVERY_CLASS | NO_CLASS)
 
 
 def test_ignored_categories_are_left_out_by_formats_without_a_mark(
