@@ -132,7 +132,7 @@ def _borders(
 
 
 def _boxes(sample: Sample, truth: EgoTruth) -> dict[str, list[dict[str, Any]]]:
-    categories = {i.instance_id: i.category for i in sample.scene.instances}
+    categories = {i.instance_id: i.category for i in sample.scene.instances if i.annotated}
     return {
         frame: [
             {
@@ -143,6 +143,7 @@ def _boxes(sample: Sample, truth: EgoTruth) -> dict[str, list[dict[str, Any]]]:
                 "quaternion_wxyz": [round(v, 8) + 0.0 for v in box.T_frame_box.quaternion_wxyz],
             }
             for number, box in boxes.items()
+            if number in categories
         ]
         for frame, boxes in (truth.boxes3d or {}).items()
     }

@@ -15,8 +15,8 @@
   are numbered among all categories of the program's families, because readers match a training
   and a test set by id, and the two seldom have the same scenery. Other categories (own assets)
   come last, in alphabetical order, if they occur.
-* **Void** are pixels of neither: ignored objects, annotated objects below the thresholds, and
-  unannotated objects of a category of things (the hood of the ego vehicle): evaluation
+* **Void** are pixels of neither: ignored and dropped objects, annotated ones below the thresholds,
+  and unannotated objects of a category of things (the hood of the ego vehicle): evaluation
   ignores predictions there.
 
 Ids of segments are numbers within an image, scattered over all colours: things count from 1 by
@@ -180,7 +180,8 @@ def find_segments(
     }
     seen = np.flatnonzero(np.bincount(surfaces.ravel()))
     ground = {k: STUFF_OF_SURFACE[SURFACES[k]] for k in seen.tolist() if k}
-    known = sorted({*stuff_of.values(), *ground.values()} - set(info.categories))
+    things = {*info.categories, *info.own_categories}
+    known = sorted({*stuff_of.values(), *ground.values()} - things)
     ids = {name: segment_id(FIRST_STUFF + k) for k, name in enumerate(known)}
     # Labels are instance ids, then surfaces; a surface has no instance.
     count = len(shown) and int(shown[-1]) + 1

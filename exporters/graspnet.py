@@ -26,7 +26,7 @@ from pydantic import Field
 
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.sample import Sample
+from gen_data.core.sample import ImageTruth, Sample
 from gen_data.exporters import coco, fragments, image_files, image_rows
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.sequences import write_bytes
@@ -72,7 +72,7 @@ class GraspNet(image_rows.ImageRowsExporter):
 
     def _grasps(self, sample: Sample, sensor: str) -> list[list[float]]:
         frame, truth = sample.frame, sample.truth[sensor]
-        shown = {t.instance.instance_id for t in truth.objects if t.box is not None}
+        shown = _shown(truth)
         T_camera_world = truth.camera.T_world_camera.inverse()
         rows = []
         for grasp in (frame.grasps if frame else None) or ():
@@ -85,9 +85,18 @@ class GraspNet(image_rows.ImageRowsExporter):
         return rows
 
 
+def _shown(truth: ImageTruth) -> set[int]:
+    """Ids of the visible instances that count."""
+    return {
+        thing.instance.instance_id
+        for thing in truth.objects
+        if thing.box is not None and not thing.ignored
+    }
+
+
 def _suctions(sample: Sample, sensor: str) -> list[list[float]]:
     frame, truth = sample.frame, sample.truth[sensor]
-    shown = {t.instance.instance_id for t in truth.objects if t.box is not None}
+    shown = _shown(truth)
     T_camera_world = truth.camera.T_world_camera.inverse()
     rows = []
     for suction in (frame.suctions if frame else None) or ():

@@ -16,7 +16,8 @@ which its image ends; null for a pinhole. Objects are:
 ``area`` (visible pixels), ``iscrowd``, ``rle`` (COCO's compressed runs of the visible mask; its
 size is height x width), ``visible_fraction``, ``occlusion``, ``truncation``, and ``box3d``
 (camera frame: centre [m], full size [m], quaternion w x y z). Annotations that are disabled are
-null.
+null. Ignored objects are left out, and ``iscrowd`` is false: scripts that train on such data sets,
+as of transformers, take every object for one to learn.
 
 Images keep the bytes of the shards' files: photographs may be JPEG or WebP. Channels of three
 16-bit components (flow, object coordinates) are binary columns of PNG files, since Pillow would
@@ -44,7 +45,7 @@ from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.lens import Lens
 from gen_data.core.reported import reported
 from gen_data.core.sample import ObjectTruth, Sample
-from gen_data.exporters import base, fragments, ignored_regions, rle, sequences
+from gen_data.exporters import base, fragments, rle, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.lens_fields import has_bent_camera, lens_fields
 from gen_data.exporters.parquet_tables import (
@@ -63,6 +64,8 @@ if TYPE_CHECKING:
 
 IMAGES = "images"
 DECIMALS = 9
+SPLIT_NAMES = {"val": "validation"}
+"""Names in ``datasets``; scripts that find none of this name split the training set at random."""
 GROUP_BYTES = 64_000_000
 """Image bytes of a row group after which the next one begins."""
 WIDE = frozenset(
@@ -139,12 +142,19 @@ class HuggingFace(base.ExporterBase):
             "configs": [
                 {
                     "config_name": "default",
-                    "data_files": [{"split": split, "path": f"data/{split}-*"} for split in splits],
+                    "data_files": [
+                        {"split": SPLIT_NAMES.get(split, split), "path": f"data/{split}-*"}
+                        for split in splits
+                    ],
                 }
             ],
             "dataset_info": {
                 "splits": [
-                    {"name": split, "num_bytes": files.bytes, "num_examples": files.total}
+                    {
+                        "name": SPLIT_NAMES.get(split, split),
+                        "num_bytes": files.bytes,
+                        "num_examples": files.total,
+                    }
                     for split, files in splits.items()
                 ],
                 "download_size": sum(files.size_bytes() for files in splits.values()),
@@ -275,10 +285,10 @@ def object_features(info: DatasetInfo) -> dict[str, Any]:
 
 def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     camera = sample.truth[sensor].camera
-    visible = [thing for thing in sample.truth[sensor].objects if thing.box is not None]
     objects = [
-        _object(sample, sensor, thing) | {"id": sample.annotation_id(sensor, number)}
-        for thing, number in ignored_regions.numbered(info, visible)
+        _object(sample, sensor, thing)
+        for thing in sample.truth[sensor].objects
+        if thing.box is not None and not thing.ignored
     ]
     return {
         "image_id": sample.image_id(sensor),
@@ -308,11 +318,12 @@ def _object(sample: Sample, sensor: str, thing: ObjectTruth) -> dict[str, Any]:
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"
     camera, box = sample.truth[sensor].camera.intrinsics, thing.box
     return {
+        "id": sample.annotation_id(sensor, thing.instance.instance_id),
         "instance_id": thing.instance.instance_id,
         "category": thing.instance.category_id - 1,
         "bbox": [box.x_min, box.y_min, box.width_px, box.height_px],
         "area": thing.visible_px,
-        "iscrowd": thing.ignored,
+        "iscrowd": False,
         "rle": rle.encode_rle(thing.mask, camera.height_px, camera.width_px)["counts"],
         "visible_fraction": thing.visible_fraction,
         "occlusion": thing.occlusion,

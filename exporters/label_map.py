@@ -238,7 +238,12 @@ class AppliedLabelMap:
             for s in self.dataset.sensors
         )
         classes = tuple(self.label_map.classes_of)
-        return replace(self.dataset, categories=classes, sensors=sensors, is_mapped=True)
+        return replace(
+            self.dataset,
+            categories=classes,
+            sensors=sensors,
+            own_categories=self.dataset.categories,
+        )
 
     def map_sample(self, sample: Sample) -> Sample:
         """The sample with mapped labels."""

@@ -53,7 +53,7 @@ def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
 
 def class_facts(info: interfaces.DatasetInfo, scene: scene.Scene) -> dict[str, Any]:
     """Key ``classes`` of a frame's line: classes by instance id, if a label map has others."""
-    if not info.is_mapped:
+    if not info.own_categories:
         return {}
     return {"classes": {str(i.instance_id): i.category_id for i in scene.instances}}
 

@@ -26,6 +26,7 @@ Reference: https://docs.ultralytics.com/datasets, and ``ultralytics.data.utils``
 """
 
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -55,6 +56,8 @@ Task = Literal["detect", "segment", "pose", "obb"]
 SPLITS = ("train", "val", "test")
 PEOPLE = ("person", "pedestrian")
 """Categories whose keypoints are preferred if none is named."""
+_OTHER_SIDE = {"left": "right", "right": "left", "l": "r", "r": "l"}
+"""Words in names of keypoints; not the letters of ``L1``."""
 
 
 class Yolo(base.ExporterBase):
@@ -290,6 +293,14 @@ def _coordinates(values: Array) -> str:
 
 
 def _mirrored(name: str) -> str:
-    """Name of a keypoint with left and right exchanged."""
-    other = {"left": "right", "right": "left"}
-    return "_".join(other.get(word, word) for word in name.split("_"))
+    """Name of a keypoint with left and right exchanged, however it joins words."""
+
+    def other_side(found: re.Match[str]) -> str:
+        word = found.group()
+        other = _OTHER_SIDE.get(word.lower(), "")
+        is_number = len(word) == 1 and name[found.end() :][:1].isdigit()
+        if not other or is_number:
+            return word
+        return other.upper() if word.isupper() else other.title() if word.istitle() else other
+
+    return re.sub("[A-Z]?[a-z]+|[A-Z]+", other_side, name)

@@ -123,7 +123,8 @@ def to_tv_tensors(pair: tuple[torch.Tensor, dict[str, torch.Tensor]]) -> tuple[A
     Returns:
         ``Image`` and the target with ``BoundingBoxes``, ``Mask`` and ``KeyPoints`` [n, k, 2]
         (torchvision 0.23); ``keypoint_visibility`` [n, k] has COCO's visibility of keypoints.
-        Mirroring keeps the names of left and right points.
+        Mirroring keeps the names of left and right points. torchvision's flips (0.28) move
+        keypoints one pixel too far to the left, or up, against image and boxes: add 1 after one.
     """
     from torchvision import tv_tensors
 

@@ -639,8 +639,8 @@ class DatasetInfo:
         step_s: Time between them [s].
         twins: Whether each view is there twice, with another demonstration.
         publication: Title, licence and creators.
-        is_mapped: Whether the categories are the classes of a label map: stored images and points
-            have other ids.
+        own_categories: Categories of the data set if a label map has replaced them by its classes:
+            stored images and points have their ids. Empty = the same.
     """
 
     name: str
@@ -654,7 +654,7 @@ class DatasetInfo:
     step_s: float = 0.1
     publication: Publication = Publication()
     twins: bool = False
-    is_mapped: bool = False
+    own_categories: tuple[str, ...] = ()
 
     def view_streams(self, scene: int, view: int, attempt: int) -> streams.Streams:
         """Random streams that draw a view of a scene: the same for twins."""

@@ -133,15 +133,15 @@ def test_stuff_has_the_same_ids_in_a_training_and_a_test_set_with_other_scenery(
     assert third["my own"] == third["aaa"] + 1
 
 
-@pytest.mark.parametrize("by_map", [False, True])
-def test_ignored_objects_are_void(world: Any, tmp_path: Path, by_map: bool) -> None:
-    """Evaluation leaves out predictions there; also if the map has no class for them."""
+@pytest.mark.parametrize("fate", ["", "drop", "ignore"])
+def test_ignored_and_dropped_objects_are_void(world: Any, tmp_path: Path, fate: Any) -> None:
+    """Evaluation leaves out predictions there; also if a map has no class for them."""
     sample, exporter = world.samples[0], CocoPanoptic()
     first, *others = sample.truth["color"].objects
     assert first.instance.category == "car"
-    if by_map:
+    if fate:
         classes = {"crate": None, "pedestrian": None}
-        exporter = MappedExporter(exporter, LabelMap(classes=classes, others="ignore"))
+        exporter = MappedExporter(exporter, LabelMap(classes=classes, others=fate))
     else:
         sample = world.ignoring(sample)
     folder = world.export(exporter, world.info(1), [sample], tmp_path)

@@ -17,7 +17,7 @@ from tests.tiers import sampled
 
 PACKED = {"huggingface", "map_vectors", "opendrive", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
-EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
+EVERY_CLASS = {"coco", "tfrecord", "voc", "webdataset"}
 """Formats with regions that a score leaves out class by class; see ``test_ignored_objects``."""
 NO_CLASS = {"cityscapes", "hdf5", "kitti", "kitti_tracking", "language", "motchallenge"}
 """Formats with a mark for ignored objects that needs no class, or that only mention them."""
@@ -29,7 +29,7 @@ OWN_IMAGES = PACKED | {
 TRACKS = {"argoverse2", "nuscenes"}
 """Formats of tracks, from which an ignored object disappears and a missing one does not."""
 WITHOUT_OBJECTS = {
-    "birdseye", "calibration", "culane", "graspnet", "kitti_stereo", "lerobot", "lidar_flow",
+    "calibration", "culane", "graspnet", "kitti_stereo", "lerobot", "lidar_flow",
     "map_vectors", "opendrive", "openlane", "rlds", "scannet", "scene_text", "semantickitti",
     "tables", "tapvid", "tum_rgbd",
 }  # fmt: skip
@@ -132,9 +132,7 @@ def test_only_formats_with_a_mark_have_ignored_objects_with_or_without_a_class(
         files(world.export(MappedExporter(exporter, m), info, samples[:1], tmp_path / m.others))
         for m in maps
     )
-    # Panoptic images have stuff where objects were dropped.
-    differing = EVERY_CLASS | NO_CLASS | {"coco_panoptic"}
-    assert (dropped != ignored) == (exporter.type in differing)
+    assert (dropped != ignored) == (exporter.type in EVERY_CLASS | NO_CLASS)
 
 
 def test_ignored_categories_are_left_out_by_formats_without_a_mark(

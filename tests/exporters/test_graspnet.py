@@ -49,3 +49,7 @@ def test_rows_are_in_the_camera_frame_of_visible_objects(world: Any, tmp_path: P
     assert_rows(folder, graspable)
     assert np.load(folder / "train/000000003_color_grasps.npy").shape == (0, 17)
     assert np.load(folder / "train/000000003_color_suctions.npy").shape == (0, 8)
+    # Ignored objects have none either.
+    folder = world.export(GraspNet(), world.info(1), [world.ignoring(graspable)], tmp_path / "b")
+    assert np.load(folder / "train/000000000_color_grasps.npy").shape == (0, 17)
+    assert np.load(folder / "train/000000000_color_suctions.npy").shape == (0, 8)

@@ -39,9 +39,10 @@ def test_parquet_files_embed_images_and_name_and_card_count_them(dataset: Path, 
     facts = card(dataset)
     assert facts["license"] == "other"
     (files,) = (config["data_files"] for config in facts["configs"])
-    assert files == [{"split": s, "path": f"data/{s}-*"} for s in ("train", "val")]
+    named = {"train": "train", "validation": "val"}
+    assert files == [{"split": k, "path": f"data/{s}-*"} for k, s in named.items()]
     splits = facts["dataset_info"]["splits"]
-    assert [(s["name"], s["num_examples"]) for s in splits] == [("train", 5), ("val", 2)]
+    assert [(s["name"], s["num_examples"]) for s in splits] == [("train", 5), ("validation", 2)]
     assert all(s["num_bytes"] > 1000 for s in splits)
     sizes = [p.stat().st_size for p in (dataset / "data").iterdir()]
     assert facts["dataset_info"]["download_size"] == sum(sizes)
@@ -59,7 +60,9 @@ def test_groups_are_bounded(world: Any, tmp_path: Path, monkeypatch: pytest.Monk
     assert by_bytes.num_row_groups == 5
 
 
-def test_flow_is_binary_what_is_missing_null_and_ignored_crowds(world: Any, tmp_path: Path) -> None:
+def test_flow_is_binary_missing_values_null_and_ignored_left_out(
+    world: Any, tmp_path: Path
+) -> None:
     """Pillow would decode flow to 8 bits; the right camera writes none."""
     info, samples = world.pairs()
     folder = world.export(HuggingFace(), info, samples, tmp_path / "pairs")
@@ -73,7 +76,9 @@ def test_flow_is_binary_what_is_missing_null_and_ignored_crowds(world: Any, tmp_
     ignored = world.ignoring(world.samples[0])
     folder = world.export(HuggingFace(), world.info(1), [ignored], tmp_path)
     (row,) = parquet(folder / "data/train-00000-of-00001.parquet").to_pylist()
-    assert row["objects"]["iscrowd"] == [True] + [False] * (len(row["objects"]["id"]) - 1)
+    _, *others = ignored.truth["color"].objects
+    assert row["objects"]["instance_id"] == [t.instance.instance_id for t in others]
+    assert not any(row["objects"]["iscrowd"])
 
 
 def card(folder: Path) -> Any:

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +125,37 @@ def test_pose_of_another_category(world: Any, tmp_path: Path) -> None:
         assert (folder / "pose/data.yaml").exists() is written
     data = yaml.safe_load((tmp_path / "car/dataset/pose/data.yaml").read_text())
     assert (data["names"], data["flip_idx"]) == ({0: "car"}, [1, 0, 3, 2, 5, 4, 7, 6])
+
+
+@pytest.mark.parametrize(
+    ("names", "flipped"),
+    [(("wheelLeft", "wheelRight", "lamp.L", "lamp.R"), [1, 0, 3, 2]),
+     (("Left wheel", "Right wheel", "LEFT", "RIGHT"), [1, 0, 3, 2]),
+     (("left-1", "right-1", "L1", "R1"), [1, 0, 2, 3]),
+     (("bright", "blight", "l_rear", "left"), [0, 1, 2, 3])],
+)  # fmt: skip
+def test_left_and_right_of_own_keypoints_change_places_in_mirrored_images(
+    names: Any, flipped: Any, world: Any, tmp_path: Path
+) -> None:
+    """However their names join words; a point without another side stays."""
+
+    def renamed(things: Any) -> Any:
+        return tuple(
+            replace(
+                thing,
+                keypoints=tuple(
+                    replace(point, name=name)
+                    for point, name in zip(thing.keypoints, names, strict=True)
+                ),
+            )
+            for thing in things
+            if thing.instance.category == "car"
+        )
+
+    sample = world.with_objects(world.samples[0], renamed)
+    folder = world.export(Yolo(tasks=("pose",)), world.info(1), [sample], tmp_path)
+    data = yaml.safe_load((folder / "pose/data.yaml").read_text())
+    assert (data["kpt_names"], data["flip_idx"]) == ({0: [*names]}, flipped)
 
 
 def test_a_missing_split_is_said_in_the_file(world: Any, tmp_path: Path) -> None:
