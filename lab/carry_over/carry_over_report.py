@@ -137,7 +137,7 @@ def _files(found: CarryOver) -> Table:
     sides = (found.real, found.ours)
     rows = [("pictures", *(str(len(side.pictures)) for side in sides))]
     for reason in dict.fromkeys((*found.real.skipped, *found.ours.skipped)):
-        rows.append((f"skipped: {reason}", *(str(side.skipped.get(reason, 0)) for side in sides)))
+        rows.append((f"remark: {reason}", *(str(side.skipped.get(reason, 0)) for side in sides)))
     ignored = [sum(o.is_ignored for p in side.pictures for o in p.objects) for side in sides]
     rows.append(("ignored regions", *map(str, ignored)))
     for fact, listed in (

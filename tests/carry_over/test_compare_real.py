@@ -94,7 +94,7 @@ def test_every_unusable_folder_has_one_error_with_its_exit_code(real: Path, tmp_
     for folder, kind, text in (
         ("reall", StorageError, "there is no folder"),
         ("empty", ConfigError, "there are no labels"),
-        ("bare", StorageError, "no picture can be used (3 x image that is missing)"),
+        ("bare", StorageError, "be used: 3 x image that is missing (such as 0.png);"),
         ("blank", NoLabels, "its labels have no object"),
     ):
         error = error_of(real, "--compare-real", tmp_path / folder)
