@@ -369,6 +369,17 @@ def test_names_of_opencvs_examples_and_the_columns_of_open3d_are_read(
     assert_projects(found.nominal_intrinsics(), project_cv(D5))
 
 
+def test_the_camera_of_a_view_of_open3d_is_read(tmp_path: Path) -> None:
+    """``PinholeCameraParameters``, as its viewer saves them."""
+    content = json.dumps({
+        "class_name": "PinholeCameraParameters", "extrinsic": np.eye(4).ravel().tolist(),
+        "intrinsic": {"width": 640, "height": 512, "intrinsic_matrix": K.T.ravel().tolist()},
+    })  # fmt: skip
+    with pytest.warns(ConfigWarning, match="not used: class_name, extrinsic$"):
+        found = sensor(tmp_path, LENS, "view.json", content=content)
+    assert_projects(found.nominal_intrinsics(), project_cv(np.zeros(5)))
+
+
 def test_json_of_opencv_may_have_comments_and_tabs(tmp_path: Path) -> None:
     """OpenCV writes flags of its sample as a comment: ``// flags: +fix_principal_point``."""
     path = tmp_path / "w.json"
@@ -797,6 +808,8 @@ LENSES = [
     (FIRST.replace("radtan", "fov"),
      "yaml:4:21: distortion_model: 'fov' has no lens here; expected radtan, equidistant or none"),
     (FIRST.replace(", 318.7, 259.3", ""), "yaml:3:15: intrinsics: expected 4 numbers, got 2"),
+    (FIRST.replace("811.9", "-811.9"),
+     "camera.yaml:3:15: intrinsics: focal lengths must be positive, got 812.4 and -811.9"),
     (FIRST.replace("811.9", "one"), "camera.yaml:3:23: intrinsics: expected a number, got 'one'"),
     ("a: 1\n", "camera.yaml:1:1: no camera found; expected a camera matrix"),
     (ROS % ("thin", 5, D5.tolist()), "'thin' is not a known lens; expected one of plumb_bob"),
@@ -831,6 +844,8 @@ PLACES = [
      "T_cn_cnm1: its last row is 1 0 0 1, expected 0 0 0 1; is the matrix transposed?"),
     ("frame: velodyne", "calib.txt", OBJECT.replace("-0.27", "nan"),
      "calib.txt:4:1: Tr_velo_to_cam: expected a number, got 'nan'"),
+    ("frame: velodyne", "calib.txt", OBJECT.replace("R0_rect: 1 0", "R0_rect: 1 1e308"),
+     "calib.txt:3:1: R0_rect: 1e+308 is too large, expected at most 1e+09"),
     ("frame: velodyne", "calib.txt", OBJECT + OBJECT,
      "calib.txt:6:1: P0: is stated twice, first in line 1"),
     ("frame: cam1, rectified: true", "chain.yaml", KALIBR,
@@ -847,6 +862,9 @@ FAULTS = [
       for words, word in (("nan 256 0.1", "nan"), ("320 256 -inf", "-inf"))),
     (LENS, "a.xml", "<opencv_storage><K>1 2</K>\n <K>1 2</K></opencv_storage>",
      "a.xml:2:2: K: is stated twice"),
+    *((LENS, "cameras.txt", f"1 SIMPLE_PINHOLE {words} 320 256\n", f"cameras.txt:1:1: {fact}")
+      for words, fact in (("640 512 -800", "PARAMS: focal lengths must be positive, got -800"),
+                          ("640 0 800", "the size must be positive, got 640 x 0"))),
     (LENS, "cameras.txt", 2 * "1 PINHOLE 640 512 800 800 320 256\n",
      "cameras.txt:2:1: CAMERA_ID: there are two cameras 1"),
     (LENS.replace("}", ", fisheye: true}"), "camera.yaml", ROS % ("plumb_bob", 4, D4.tolist()),

@@ -199,7 +199,7 @@ UNREAD: list[Any] = [
      "no lens here; expected one of OPENCV, PINHOLE"),
     ("a.json", nerf("OPENCV", k4=0.1).encode(), "a.json:9:8: k4: other than 0 has no lens here"),
     ("a.yaml", slam("Camera", "PinHole").replace("812.4", "-1").encode(),
-     "a.yaml:4:12: focal lengths must be positive, got -1 and 811.9"),
+     "a.yaml:4:12: Camera.fx: focal lengths must be positive, got -1 and 811.9"),
     ("a.yaml", EUROC.replace("0.0, 0.0, 1.0]", "0.0, 0.0, 2.0]").encode(),
      "a.yaml:3:3: T_BS: its last row is 0 0 0 2, expected 0 0 0 1"),
 ]  # fmt: skip

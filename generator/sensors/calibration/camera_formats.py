@@ -28,6 +28,7 @@ from gen_data.sensors.calibration.calibration import (
     Frame,
     attempt,
     camera_matrix,
+    check_focal,
     check_rotation,
     fail,
     finite,
@@ -406,6 +407,7 @@ def _kalibr_camera(entries: Entries) -> CalibratedCamera:
         fact = f"'{projection.text}' has no lens here; expected pinhole, or omni with xi 0"
         fail(projection, "camera_model", fact)
     fx, fy, cx, cy = rest
+    check_focal(fx, fy, given, "intrinsics")
     name = distortion.text if distortion else "none"
     lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
     if name not in ("radtan", "radial-tangential", "equidistant", "none"):
@@ -481,8 +483,9 @@ def _colmap_camera(place: Position, words: Sequence[str]) -> CalibratedCamera:
     coefficients = [given.get(name, 0.0) for name in COEFFICIENTS[kind]]
     lens = lens_of(kind, coefficients, Node(place, ()), "PARAMS")
     focal = (given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0)))
-    if min(focal) <= 0.0 or min(width, height) < 1:
-        refuse(place, "", "sizes and focal lengths must be positive")
+    check_focal(*focal, Node(place, ()), "PARAMS")
+    if min(width, height) < 1:
+        refuse(place, "", f"the size must be positive, got {width} x {height}")
     return CalibratedCamera(
         place, focal, (given["cx"], given["cy"]), *lens, (width, height), "halves"
     )

@@ -215,9 +215,10 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> calib
 
 def _number(word: str) -> float | str:
     try:
-        return calibration.finite(word)
+        value = float(word)
     except ValueError:
         return word
+    return value if math.isfinite(value) else word
 
 
 def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) -> Any:

@@ -124,8 +124,7 @@ def _camera(
 
     first = entries.root.entries[layout.numbers.split()[0]]
     fx, fy, cx, cy = map(number, layout.numbers.split())
-    if min(fx, fy) <= 0.0:
-        calibration.fail(first, "", f"focal lengths must be positive, got {fx:g} and {fy:g}")
+    calibration.check_focal(fx, fy, first, layout.numbers.split()[0])
     stated = entries.take(layout.model)
     name = stated.text if stated else ""
     fisheye = entries.take(("is_fisheye",))

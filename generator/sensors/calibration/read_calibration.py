@@ -4,6 +4,7 @@ import json
 import re
 import struct
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -97,6 +98,12 @@ def _read_tree(root: Node, *, fisheye: bool, rectified: bool) -> Calibration:
         return euroc_sensor(root)
     if root.get("transforms") or root.get("child_frame_id"):
         return frame_formats.tf_frames(root)
+    inner = root.get("intrinsic")
+    if inner is not None and inner.get("intrinsic_matrix"):
+        # Open3D: PinholeCameraParameters.
+        others = [key for key in root.entries if key != "intrinsic"]
+        found = camera_file(inner, fisheye=fisheye, rectified=rectified)
+        return replace(found, unused=[*found.unused, *others])
     return named_cameras(root) or camera_file(root, fisheye=fisheye, rectified=rectified)
 
 
