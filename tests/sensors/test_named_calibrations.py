@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.assemble.config import parse_config
 from gen_data.core.errors import ConfigWarning
 from gen_data.core.se3 import Array
 from tests.sensors.test_calibration_files import (
@@ -147,10 +148,20 @@ distortion_coefficients: [-0.21, 0.09, 0.0007, -0.0004]
 
 
 def test_a_sensor_of_euroc_projects_as_opencv_does(tmp_path: Path) -> None:
-    with pytest.warns(ConfigWarning, match="a sensor of EuRoC; not used: sensor_type, .*rate_hz$"):
+    with pytest.warns(ConfigWarning, match="a sensor of EuRoC; not used: rate_hz$"):
         found = sensor(tmp_path, LENS, content=EUROC)
     assert found.size_px == (640, 512)
     assert_projects(found.nominal_intrinsics(), project_cv(D5[:4]))
+
+
+def test_an_imu_of_euroc_is_placed_by_its_sensor_file(tmp_path: Path) -> None:
+    content = EUROC.partition("resolution")[0].replace("camera", "imu")
+    text = "{type: imu, name: imu, rig: r, mounting: {file: imu.yaml}}"
+    (tmp_path / "imu.yaml").write_text(content, encoding="utf-8")
+    config = f"template: tabletop\nsensors: [{text}]\n"
+    with pytest.warns(ConfigWarning, match="not used: rate_hz$"):
+        found: Any = parse_config(config, str(tmp_path / "mine.yaml"), "mine").sensors[0]
+    np.testing.assert_allclose(found.T_rig_sensor.matrix(), POSE, atol=1e-6)
 
 
 def binary(*cameras: tuple[int, int, list[float]], count: int = 0) -> bytes:

@@ -361,18 +361,22 @@ def kalibr_chain(root: Node) -> Calibration:
 
 
 def euroc_sensor(root: Node) -> Calibration:
-    """``sensor.yaml`` of a camera of EuRoC and others; ``T_BS`` is its pose in the body's frame.
+    """``sensor.yaml`` of EuRoC and others; ``T_BS`` is the pose of the sensor in the body's frame.
+
+    A camera and its frame are ``camera``; the frame of another sensor has its ``sensor_type``.
 
     Raises:
         ConfigError: the pose is malformed.
     """
     entries = Entries(root)
-    cameras = {"camera": attempt(partial(_kalibr_camera, entries))}
+    is_camera = root.get("camera_model") is not None
+    cameras = {"camera": attempt(partial(_kalibr_camera, entries))} if is_camera else {}
     frames: dict[str, Frame] = {}
-    pose = entries.take(("T_BS",))
+    pose, kind = entries.take(("T_BS",)), entries.take(("sensor_type",))
+    name = "camera" if is_camera or kind is None else kind.text
     if pose is not None:
         place = rigid(numbers(pose, [12, 16], "T_BS"), pose, "T_BS")
-        frames = {"body": Frame(), "camera": Frame("body", place, optical=True)}
+        frames = {"body": Frame(), name: Frame("body", place, optical=is_camera)}
     return Calibration(root.position.file, "a sensor of EuRoC", cameras, frames, entries.unused())
 
 

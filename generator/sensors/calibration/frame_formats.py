@@ -147,9 +147,8 @@ def nuscenes_frames(records: Any, path: Path) -> calibration.Calibration:
         fact = f"needs the names of channels in {table}: {error.strerror}"
         raise ConfigError(f"{path}: {fact}") from None
     except (KeyError, TypeError, ValueError) as error:
-        raise ConfigError(
-            f"{path}: is not a calibrated_sensor.json of nuScenes ({error})"
-        ) from None
+        kind = f"{type(error).__name__}: {error}"
+        raise ConfigError(f"{path}: is not a calibrated_sensor.json of nuScenes ({kind})") from None
     unused = sorted({key for record in records for key in record} - _NUSCENES)
     kind = "calibrated sensors of nuScenes"
     return calibration.Calibration(str(path), kind, cameras, frames, unused, {"rectified"})
@@ -227,7 +226,8 @@ def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) ->
     S = lines.get(f"S_rect_0{number}" if rectified else f"S_0{number}")
     size = tuple(int(v) for v in calibration.numbers(S, [2], "S")) if S else None
     if P is not None:
-        fx, fy, cx, cy = calibration.camera_matrix(P, "P", 4)
+        name = f"P{number}" if f"P{number}" in lines else f"P_rect_0{number}"
+        fx, fy, cx, cy = calibration.camera_matrix(P, name, 4)
         keys = {f"P{number}", f"P_rect_0{number}", f"S_rect_0{number}"}
         camera = calibration.CalibratedCamera(P.position, (fx, fy), (cx, cy), size_px=size)  # type: ignore[arg-type]
         frame = camera_formats.shifted(P, "camera_0")
@@ -240,13 +240,16 @@ def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) ->
     R, T = lines.get(f"R_0{number}"), lines.get(f"T_0{number}")
     if K is None or D is None or R is None or T is None:
         return
-    fx, fy, cx, cy = calibration.camera_matrix(K, "K")
-    lens = camera_formats.lens_of("brown_conrady", calibration.numbers(D, [5], "D"), D, "D")
-    rows = np.array(calibration.numbers(R, [9], "R")).reshape(3, 3)
-    calibration.check_rotation(rows, R, "R")
+    names = [f"{name}_0{number}" for name in "KDRT"]
+    fx, fy, cx, cy = calibration.camera_matrix(K, names[0])
+    coefficients = calibration.numbers(D, [5], names[1])
+    lens = camera_formats.lens_of("brown_conrady", coefficients, D, names[1])
+    rows = np.array(calibration.numbers(R, [9], names[2])).reshape(3, 3)
+    calibration.check_rotation(rows, R, names[2])
     # Points of camera 0 are mapped to points of the camera.
-    pose = SE3.from_matrix(np.column_stack([rows, calibration.numbers(T, [3], "T")])).inverse()
-    keys = {f"{name}_0{number}" for name in "SKDRT"}
+    shift = calibration.numbers(T, [3], names[3])
+    pose = SE3.from_matrix(np.column_stack([rows, shift])).inverse()
+    keys = {f"S_0{number}", *names}
     camera = calibration.CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size)  # type: ignore[arg-type]
     yield camera, calibration.Frame("camera_0", pose, optical=True), keys
 

@@ -94,7 +94,7 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
 def _read_tree(root: Node, *, fisheye: bool, rectified: bool) -> Calibration:
     if any(node.get("camera_model") for node in root.entries.values()):
         return kalibr_chain(root)
-    if root.get("camera_model") and root.get("intrinsics"):
+    if root.get("T_BS") or (root.get("camera_model") and root.get("intrinsics")):
         return euroc_sensor(root)
     if root.get("transforms") or root.get("child_frame_id"):
         return frame_formats.tf_frames(root)
