@@ -552,7 +552,7 @@ transforms:
 ---
 """
 URDF = """\
-<robot name="r"><link name="base_link"/><link name="camera_link"/>
+<robot name="r"><link name="base_link"/><link name="camera_link"/><!-- <calibration> -->
 <link name="camera_optical_frame"/>
 <joint name="a" type="fixed"><parent link="base_link"/><child link="camera_link"/>
 <origin xyz="1.0 0.2 0.5" rpy="0.1 0.2 0.3"/></joint>

@@ -206,6 +206,7 @@ UNREAD: list[Any] = [
     ("a.yaml", b"%YAML:1.0\n---\nmodel_type: MEI\n", "camodocal without a lens here, which is not"),
     ("a.yaml", b"a: 1\n", "no camera found; expected a camera matrix such as K, camera_matrix or M1"
      ", or R and T of a pair; of other formats, type fx_px, fy_px, cx_px, cy_px as intrinsics"),
+    ("a.json", json.dumps({**FOCAL, **BROWN}).encode(), "a.json:1:1: no camera found; expected"),
     ("a.json", nerf("EQUIRECTANGULAR").encode(), "a.json:2:18: camera_model: 'EQUIRECTANGULAR' has "
      "no lens here; expected one of OPENCV, PINHOLE"),
     ("a.json", nerf("OPENCV", k4=0.1).encode(), "a.json:9:8: k4: other than 0 has no lens here"),

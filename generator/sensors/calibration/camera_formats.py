@@ -111,9 +111,12 @@ class Entries:
         """The first entry of one of the names, with the number of a camera of a pair."""
         for name in names:
             for key in (f"{name}{number}", f"{name}_{number}")[: 2 if number else 1]:
-                if key in self.root.entries:
-                    self.used.add(key)
-                    return self.root.entries[key]
+                found = self.root.entries.get(key)
+                # k1 and p1 are coefficients, K1 and P1 the matrices of a pair.
+                if found is None or (key[:-1] in ("k", "p", "d") and number and not found.children):
+                    continue
+                self.used.add(key)
+                return found
         return None
 
     def unused(self) -> list[str]:

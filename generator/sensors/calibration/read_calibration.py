@@ -35,7 +35,9 @@ _UNREAD: Mapping[bytes, tuple[str, str]] = {
     rb"\A\s*\[[A-Za-z]\w*\]\s": ("an INI file, as of ZED cameras", _TYPE),
     rb"\A(PK\x03\x04|\x93NUMPY|\x80[\x02-\x05])": ("an archive of NumPy or Python", _WRITE),
     rb"\A(MATLAB |\x89HDF)": ("a MAT-file", f"use cameraIntrinsicsToOpenCV, and {_WRITE}"),
-    rb"<(calibration|document)\b": ("XML of Metashape", "export the calibration as OpenCV"),
+    rb"\A\s*(<\?xml[^>]*>\s*)?<(calibration|document)\b": (
+        "XML of Metashape", "export the calibration as OpenCV",
+    ),
     rb"\AParGroup": (
         "a file of HALCON",
         "undistort the images, and type Focus / Sx, Focus / Sy, Cx and Cy as intrinsics",
@@ -43,7 +45,7 @@ _UNREAD: Mapping[bytes, tuple[str, str]] = {
     rb"(?m)^model_type:\s*(MEI|SCARAMUZZA)": (
         "a camera of camodocal without a lens here", "calibrate it as KANNALA_BRANDT",
     ),
-    rb'"value0"': ("JSON of Basalt", _TYPE),
+    rb'\A\s*\{\s*"value0"': ("JSON of Basalt", _TYPE),
     rb"\A(#usda|PXR-USDC)": (
         "an OpenUSD stage", "type hfov_deg: 2 atan(horizontalAperture / (2 focalLength))",
     ),
