@@ -199,7 +199,7 @@ UNREAD: list[Any] = [
     ("a.mat", b"MATLAB 5.0 MAT-file, Platform", "is a MAT-file, which is not read here; use"),
     ("a.xml", b"<?xml version='1.0'?>\n<calibration><f>1</f></calibration>", "XML of Metashape"),
     ("a.cal", b"ParGroup: Cam1: CameraParameters;\n", "is a file of HALCON, which is not read"),
-    ("a.json", b'{"value0": {"T_imu_cam": []}}', "is JSON of Basalt, which is not read here; type"),
+    ("a.json", b'{"value0": {"T_imu_cam": []}}', "is JSON of Basalt, which is not read here;"),
     ("a.usda", b'#usda 1.0\ndef Camera "c" {}\n', "is an OpenUSD stage, which is not read here"),
     ("a.feather", b"ARROW1\x00\x00", "is a table of Arrow, as of Argoverse, which is not read"),
     ("a.json", b'{"beam_altitude_angles": [1.0]}', "is metadata of an Ouster scanner, which"),

@@ -45,7 +45,9 @@ _UNREAD: Mapping[bytes, tuple[str, str]] = {
     rb"(?m)^model_type:\s*(MEI|SCARAMUZZA)": (
         "a camera of camodocal without a lens here", "calibrate it as KANNALA_BRANDT",
     ),
-    rb'\A\s*\{\s*"value0"': ("JSON of Basalt", _TYPE),
+    rb'\A\s*\{\s*"value0"': (
+        "JSON of Basalt", "type kb4 or radtan8 as intrinsics and lens; ds and eucm have none here",
+    ),
     rb"\A(#usda|PXR-USDC)": (
         "an OpenUSD stage", "type hfov_deg: 2 atan(horizontalAperture / (2 focalLength))",
     ),
