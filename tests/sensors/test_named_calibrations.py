@@ -108,30 +108,12 @@ def matrix(name: str, values: Array) -> str:
     return f"{name}: !!opencv-matrix\n{rows}"
 
 
-@pytest.mark.filterwarnings("ignore:.*not used")
-@pytest.mark.parametrize(("name", "content", "frame", "pose"), [
-    ("slam.yaml", "1", "1", POSE),
-    ("slam.yaml", "2", "2", POSE @ RIGHT),
-    ("vins.yaml", "%YAML:1.0\n\nimu: 1\n", "cam1", RIGHT),
-    ("sensor.yaml", "", "camera", POSE),
-])  # fmt: skip
-def test_cameras_of_orb_slam_and_euroc_are_placed_from_the_body(
-    tmp_path: Path, name: str, content: str, frame: str, pose: Array
-) -> None:
-    """``T_b_c1``, ``T_c1_c2`` and ``T_BS`` take points of the camera to the body or camera 1."""
-    if content.startswith("%"):
-        content += matrix("body_T_cam0", POSE) + matrix("body_T_cam1", RIGHT)
-    elif content:
-        second = slam("Camera2", "PinHole").partition('"\n')[2].partition("Camera.width")[0]
-        content = slam("Camera1", "PinHole") + second
-        content += matrix("IMU.T_b_c1", POSE) + matrix("Stereo.T_c1_c2", RIGHT)
-    else:
-        content = EUROC
-    text = f"rig: r, mounting: {{file: FILE, frame: '{frame}', relative_to: body}}"
-    found = sensor(tmp_path, text, name, content=content)
-    np.testing.assert_allclose(rig_pose(found), pose, atol=1e-6)
-
-
+PAIR = (
+    slam("Camera1", "PinHole")
+    + "".join(f"Camera2.{key}: {value}\n" for key, value in FOCAL.items())
+    + matrix("IMU.T_b_c1", POSE)
+    + matrix("Stereo.T_c1_c2", RIGHT)
+)
 EUROC = f"""\
 sensor_type: camera
 T_BS:
@@ -145,6 +127,24 @@ intrinsics: [812.4, 811.9, 318.7, 259.3] #fu, fv, cu, cv
 distortion_model: radial-tangential
 distortion_coefficients: [-0.21, 0.09, 0.0007, -0.0004]
 """
+
+
+@pytest.mark.filterwarnings("ignore:.*not used")
+@pytest.mark.parametrize(("name", "content", "frame", "pose"), [
+    ("slam.yaml", PAIR, "1", POSE),
+    ("slam.yaml", PAIR, "2", POSE @ RIGHT),
+    ("old.yaml", slam("Camera", "PinHole") + matrix("Tbc", POSE) + matrix("Tlr", RIGHT[:3]),
+     "2", POSE @ RIGHT),
+    ("vins.yaml", matrix("body_T_cam0", POSE) + matrix("body_T_cam1", RIGHT), "cam1", RIGHT),
+    ("sensor.yaml", EUROC, "camera", POSE),
+])  # fmt: skip
+def test_cameras_of_orb_slam_and_euroc_are_placed_from_the_body(
+    tmp_path: Path, name: str, content: str, frame: str, pose: Array
+) -> None:
+    """``T_b_c1``, ``T_c1_c2`` and ``T_BS`` take points of the camera to the body or camera 1."""
+    text = f"rig: r, mounting: {{file: FILE, frame: '{frame}', relative_to: body}}"
+    found = sensor(tmp_path, text, name, content=content)
+    np.testing.assert_allclose(rig_pose(found), pose, atol=1e-6)
 
 
 def test_a_sensor_of_euroc_projects_as_opencv_does(tmp_path: Path) -> None:
