@@ -561,8 +561,17 @@ URDF = """\
 """
 
 
+AUTOWARE = """\
+base_link:
+  camera_link: {x: 1.0, y: 0.2, z: 0.5, roll: 0.1, pitch: 0.2, yaw: 0.3}
+camera_link:
+  camera_optical_frame: {x: 0, y: 0, z: 0, roll: -1.57079632679, pitch: 0, yaw: -1.57079632679}
+"""
+
+
 @pytest.mark.parametrize("frame", ["camera_link", "camera_optical_frame"])
 @pytest.mark.parametrize(("name", "content", "angles_deg"), [
+    ("kit.yaml", AUTOWARE, tuple(np.degrees([0.3, -0.2, 0.1]))),
     ("tf.yaml", TF, (2.0 * math.degrees(math.atan2(0.6, 0.8)), 0.0, 0.0)),
     # Rz(yaw) Ry(pitch) Rx(roll): a positive pitch looks down.
     ("robot.urdf", URDF, tuple(np.degrees([0.3, -0.2, 0.1]))),
@@ -587,6 +596,13 @@ def test_transforms_that_ros_prints_one_after_the_other_are_read_together(tmp_pa
     broken = content.replace("z: -0.5", "z: one")
     text = "rig: r, mounting: {file: FILE, frame: camera_link}"
     assert told(tmp_path, text, "tf.yaml", content=broken).startswith("tf.yaml:9:")
+
+
+@pytest.mark.parametrize("suffix", ["optical", "optical_frame", "optical_link"])
+def test_suffixes_of_optical_frames_of_ros(tmp_path: Path, suffix: str) -> None:
+    content = TF.replace("camera_optical_frame", f"camera_{suffix}")
+    found = mounted(tmp_path, f"frame: camera_{suffix}", "tf.yaml", content)
+    assert (found.pitch_deg, found.roll_deg) == pytest.approx((0.0, 0.0))
 
 
 def test_axes_can_be_stated_where_a_name_misleads(tmp_path: Path) -> None:
@@ -832,6 +848,9 @@ PLACES = [
      "cam3.T_cn_cnm1: refers to cam2, which the file lacks"),
     ("frame: a", "tf.yaml", TF.replace("w: 0.8", "w: 1.8"), "is not a unit quaternion"),
     ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="'), "expected three numbers"),
+    ("frame: a", "kit.yaml", AUTOWARE.replace("0.3", "left"), "kit.yaml:2:69: yaw: expected"),
+    ("frame: a", "kit.yaml", AUTOWARE + AUTOWARE.partition("\ncamera")[0].replace("base", "other"),
+     "kit.yaml:6:16: camera_link: has two parents"),
     ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>; give a file "
      "of OpenCV, or a URDF"),
     ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="nan'),

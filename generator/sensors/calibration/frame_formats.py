@@ -1,7 +1,8 @@
 """Frames of rigs of ROS, nuScenes and KITTI.
 
 * ROS: ``TransformStamped`` in YAML, as ``ros2 topic echo /tf_static`` prints it, and URDF. By REP
-  103, frames whose names end with ``_optical`` or ``_optical_frame`` have Z forward, others X.
+  103, frames whose names end with ``_optical``, ``_optical_frame`` or ``_optical_link`` have Z
+  forward, others X. Autoware's ``sensor_kit_calibration.yaml``: frames below their parents.
 * nuScenes: ``calibrated_sensor.json`` next to ``sensor.json``; frames are channels, the root is the
   ego vehicle's: on the ground below the middle of the rear axle. Cameras have Z forward; the
   laser scanner has Y forward.
@@ -37,7 +38,7 @@ _NAMES = {
 _NUSCENES = {"token", "sensor_token", "translation", "rotation", "camera_intrinsic"}
 """Keys of a record. nuImages has \
 ``camera_distortion`` of the camera, but its images are undistorted."""
-_OPTICAL = ("_optical", "_optical_frame")
+_OPTICAL = ("_optical", "_optical_frame", "_optical_link")
 
 
 def is_optical(name: str) -> bool:
@@ -78,6 +79,36 @@ def tf_frames(root: Node) -> calibration.Calibration:
         frames[name] = calibration.Frame(above, place, is_optical(name))
         frames.setdefault(above, calibration.Frame(optical=is_optical(above)))
     return calibration.Calibration(root.position.file, "transforms of ROS", {}, frames)
+
+
+_PLACE = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+def is_autoware(root: Node) -> bool:
+    """Whether a file lists frames by their parents, with the six numbers of Autoware."""
+    groups = [group.entries.values() for group in root.entries.values()]
+    return bool(groups) and all(
+        group and all(set(_PLACE) <= set(one.entries) for one in group) for group in groups
+    )
+
+
+def autoware_frames(root: Node) -> calibration.Calibration:
+    """Frames of Autoware: position [m] and angles [rad] below the name of the parent, as in URDF.
+
+    Raises:
+        ConfigError: a number is malformed, or a frame has two parents.
+    """
+    frames = {name: calibration.Frame(optical=is_optical(name)) for name in root.entries}
+    for parent, group in root.entries.items():
+        for name, node in group.entries.items():
+            x, y, z, roll, pitch, yaw = (
+                calibration.numbers(node.entries[key], [1], key)[0] for key in _PLACE
+            )
+            if frames.get(name, calibration.Frame()).parent:
+                calibration.fail(node, name, "has two parents")
+            place = turned((x, y, z), yaw, -pitch, roll)
+            frames[name] = calibration.Frame(parent, place, is_optical(name))
+    return calibration.Calibration(root.position.file, "places of Autoware", {}, frames)
 
 
 def urdf_frames(robot: Element, file: str) -> calibration.Calibration:

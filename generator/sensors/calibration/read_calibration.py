@@ -102,6 +102,8 @@ def _read_tree(root: Node, *, fisheye: bool, rectified: bool) -> Calibration:
         return euroc_sensor(root)
     if root.get("transforms") or root.get("child_frame_id"):
         return frame_formats.tf_frames(root)
+    if frame_formats.is_autoware(root):
+        return frame_formats.autoware_frames(root)
     inner = root.get("intrinsic")
     if inner is not None and inner.get("intrinsic_matrix"):
         # Open3D: PinholeCameraParameters.
