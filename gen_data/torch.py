@@ -20,7 +20,15 @@ from gen_data.api.loader import Loader
 from gen_data.api.sample import Sample
 from gen_data.targets import detection_target
 
-__all__ = ["SampleDataset", "SampleStream", "collate", "loader", "to_tensors", "to_tv_tensors"]
+__all__ = [
+    "SampleDataset",
+    "SampleStream",
+    "collate",
+    "loader",
+    "object_rows",
+    "to_tensors",
+    "to_tv_tensors",
+]
 
 Target = Callable[[Sample], Any]
 
@@ -142,3 +150,17 @@ def to_tv_tensors(pair: tuple[torch.Tensor, dict[str, torch.Tensor]]) -> tuple[A
         wrapped["keypoints"] = tv_tensors.KeyPoints(points[..., :2], canvas_size=canvas_size)
         wrapped["keypoint_visibility"] = points[..., 2]
     return tv_tensors.Image(image), wrapped
+
+
+def object_rows(pair: tuple[Any, Mapping[str, Any]]) -> tuple[torch.Tensor, ...]:
+    """Tensors with a row per object, besides boxes and masks.
+
+    torchvision's ``SanitizeBoundingBoxes(labels_getter=object_rows)`` removes rows of all of them
+    with a box. By default it keeps the rows of keypoints (0.28), which then belong to other boxes.
+
+    Args:
+        pair: An image and its target, also of ``to_tv_tensors``.
+    """
+    _, target = pair
+    names = ("labels", "area", "iscrowd", "keypoints", "keypoint_visibility")
+    return tuple(target[name] for name in names if name in target)

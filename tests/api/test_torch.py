@@ -163,6 +163,25 @@ def test_targets_are_wrapped_for_torchvision(stored: Any, monkeypatch: pytest.Mo
     assert type(target["boxes"]) is torch.Tensor, "the target that was passed in is unchanged"
 
 
+def test_rows_of_objects_are_all_that_torchvision_does_not_filter(stored: Any) -> None:
+    """Every tensor with a row per object; it filters boxes and masks by their kinds."""
+    import torch
+
+    import gen_data.torch as gt
+    from gen_data.targets import segmentation_target
+
+    sample = next(s for s in stored if len(s.boxes2d["color"]) > 3)
+    image, target = gt.to_tensors(segmentation_target(sample))
+    count = len(target["boxes"])
+    target |= {"keypoints": torch.rand(count, 5, 2), "keypoint_visibility": torch.rand(count, 5)}
+    listed = gt.object_rows((image, target))
+    others = [
+        v for k, v in target.items() if k not in ("boxes", "masks") and v.shape[:1] == (count,)
+    ]
+    assert {*map(id, listed)} == {*map(id, others)}
+    assert len(listed) == 5
+
+
 def test_importing_the_package_does_not_import_torch() -> None:
     import subprocess
 
