@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch.utils.data import Dataset, IterableDataset
+from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
 from gen_data.api.dataset import SampleSequence
 from gen_data.api.loader import Loader
 from gen_data.api.sample import Sample
+from gen_data.core.errors import ConfigError
 from gen_data.targets import detection_target
 
 __all__ = [
@@ -75,7 +76,17 @@ class SampleStream(IterableDataset[Any]):
         self.source = source
 
     def __iter__(self) -> Iterator[Any]:
-        """Batches of one epoch."""
+        """Batches of one epoch.
+
+        Raises:
+            ConfigError: workers of a ``DataLoader`` iterate: each would yield the whole epoch, the
+                same one every time.
+        """
+        if get_worker_info() is not None:
+            raise ConfigError(
+                "num_workers: a SampleStream has its own workers; expected 0, and `workers` of the "
+                "Loader instead"
+            )
         for batch in self.source:
             yield collate([to_tensors(item) for item in batch])
 

@@ -87,6 +87,22 @@ def test_rendering_in_training_gives_the_finished_samples(stored: Any, tmp_path:
             assert torch.allclose(one.nan_to_num(posinf=0), other.nan_to_num(posinf=0), atol=6e-5)
 
 
+@pytest.mark.parametrize("workers", [0, 2])
+def test_workers_of_a_data_loader_do_not_repeat_an_epoch(stored: Any, workers: int) -> None:
+    """Each of them would have a copy of the stream: they are refused."""
+    from torch.utils.data import DataLoader
+
+    import gen_data.torch as gt
+
+    batches = DataLoader(gt.loader(stored, batch_size=3), batch_size=None, num_workers=workers)
+    if workers:
+        with pytest.raises(gen_data.ConfigError, match="num_workers: a SampleStream has its own"):
+            list(batches)
+    else:
+        numbers = [int(t["image_id"]) for _, targets in batches for t in targets]
+        assert numbers == list(range(1, 11))
+
+
 def test_laser_boxes_hold_their_points() -> None:
     """Points in the box's frame are inside; as many as counted."""
     import gen_data.torch as gt
