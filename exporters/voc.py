@@ -84,9 +84,11 @@ class Voc(base.ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no sensor writes the rgb channel, or there are too many categories.
+            ConfigError: no sensor writes the rgb channel, there are too many categories, or two
+                have one name of files.
         """
         check_channels(info, (), self.type)
+        base.check_distinct(self.type, info, _file_word)
         if len(info.categories) > LABELS_MAX:
             raise ConfigError(
                 f"exporter '{self.type}': label images have room for {LABELS_MAX} categories, but "
