@@ -98,6 +98,7 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("tum_rgbd", {}, RGB_ONLY, "camera 'color' does not write the channel depth"),
     ("tum_rgbd", {"imu": "imo"}, DRIVE, "no IMU 'imo'; expected one of: imu"),
     ("voc", {}, HYPHENS, ALIKE),
+    *(("voc", {}, {"categories": (k,)}, f"category '{k}': labelmap") for k in ("size: L", "#5")),
     ("voc", {}, {"categories": ("c",) * 255}, "room for 254 categories, but there are 255"),
     ("webdataset", {}, {"cameras": ("color", "Color")}, r"'color' and 'Color' differ in case"),
     ("yolo", {"pose_category": "cars"}, {}, r"pose_category: there is no category 'cars'.*car"),
