@@ -160,8 +160,9 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
         # OpenCV's sample stereo_calib writes R and T to a separate file.
         frames = _pair_frames(entries)
     if not cameras and not frames:
-        known = "projection matrix such as P" if rectified else "camera matrix such as K"
-        fact = f"no camera found; expected a {known}, {_MATRICES[0]} or M1, or R and T of a pair; "
+        pair = f"camera matrix such as K, {_MATRICES[0]} or M1, or R and T of a pair"
+        known = "projection matrix such as P or P1" if rectified else pair
+        fact = f"no camera found; expected a {known}; "
         fail(root, "", f"{fact}of other formats, type fx_px, fy_px, cx_px, cy_px as intrinsics")
     if "2" in cameras and not rectified:
         frames = _pair_frames(entries)
