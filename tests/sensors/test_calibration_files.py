@@ -819,6 +819,9 @@ LENSES = [
     ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\nxi: 1.2\nD: [0.1, 0.2, 0, 0]",
      "camera.yaml:2:5: xi: omnidirectional lenses have no lens here"),
     (ROS % ("none", 5, D5.tolist()), UNDISTORTED),
+    *((MESSAGE.replace("---", f"roi: {{x_offset: {x}, y_offset: 0, width: {w}, height: {h}}}"),
+       f"camera.yaml:7:6: roi: {fact} is not inside the image of 640 x 512 pixels")
+      for x, w, h, fact in ((600, 41, 9, "41 x 9 at (600, 0)"), (9, 0, 0, "640 x 512 at (9, 0)"))),
     (MESSAGE.replace("---", "binning_x: 1.5"), "binning_x: expected a whole number"),
     (FIRST.replace("radtan", "none"), UNDISTORTED),
     (FIRST.replace("pinhole", "ds"),

@@ -243,6 +243,10 @@ def _read_out(camera: CalibratedCamera, entries: Entries) -> CalibratedCamera:
         corner = [_whole(region, f"{axis}_offset") for axis in "xy"]
         width, height = (_whole(region, side) for side in ("width", "height"))
         size = (width, height) if width and height else size
+        whole = camera.size_px or size
+        if size and whole and any(at + n > m for at, n, m in zip(corner, size, whole, strict=True)):
+            fact = f"{size[0]} x {size[1]} at ({corner[0]}, {corner[1]}) is not inside"
+            fail(region, "roi", f"{fact} the image of {whole[0]} x {whole[1]} pixels")
     if size is not None:
         size = (size[0] // bins[0], size[1] // bins[1])
     (fx, fy), (cx, cy) = camera.focal_px, camera.center_px
