@@ -531,7 +531,9 @@ def test_a_pair_of_opencv_is_placed_by_r_and_t(tmp_path: Path) -> None:
     alone = cv_text(".yml", tmp_path, {"R": R, "T": T})
     same = mounted(tmp_path, "frame: '2', unit: mm", "extrinsics.yml", alone)
     np.testing.assert_allclose(rig_pose(same), rig_pose(found), atol=1e-12)
-    assert "has several cameras, or none" in told(tmp_path, LENS, "extrinsics.yml", content=alone)
+    assert "has no cameras; expected a file that has" in told(
+        tmp_path, LENS, "extrinsics.yml", content=alone
+    )
 
 
 def test_a_place_that_is_probably_in_millimetres_is_pointed_out(tmp_path: Path) -> None:
@@ -817,6 +819,9 @@ LENSES = [
     ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\nxi: 1.2\nD: [0.1, 0.2, 0, 0]",
      "camera.yaml:2:5: xi: omnidirectional lenses have no lens here"),
     (ROS % ("none", 5, D5.tolist()), UNDISTORTED),
+    *((MESSAGE.replace("---", f"roi: {{x_offset: {x}, y_offset: 0, width: {w}, height: {h}}}"),
+       f"camera.yaml:7:6: roi: {fact} is not inside the image of 640 x 512 pixels")
+      for x, w, h, fact in ((600, 41, 9, "41 x 9 at (600, 0)"), (9, 0, 0, "640 x 512 at (9, 0)"))),
     (MESSAGE.replace("---", "binning_x: 1.5"), "binning_x: expected a whole number"),
     (FIRST.replace("radtan", "none"), UNDISTORTED),
     (FIRST.replace("pinhole", "ds"),
@@ -837,7 +842,7 @@ LENSES = [
      "camera.yaml:1:14: image size: expected whole numbers, got 640 x 512.5"),
     (COEFFICIENTS.replace("[-0.21, 0.09, 0.0007, -0.0004, -0.012]", "$base64$MWQg"),
      "distortion coefficients: expected a number, got '$base64$MWQg'; write it without Base64"),
-    (KALIBR, "has several cameras, or none: name one; expected one of cam0, cam1"),
+    (KALIBR, "has several cameras: name one; expected one of cam0, cam1"),
 ]  # fmt: skip
 PLACES = [
     ("frame: cam9", "chain.yaml", KALIBR, "has no frame 'cam9'; expected one of cam0, cam1"),
@@ -897,6 +902,8 @@ FAULTS = [
     ("offset_m: [0, 0, 1], mounting: {file: FILE, frame: cam1}", "camera.yaml", KALIBR,
      "offset_m: the file that mounting names gives it"),
     (LENS.replace("file", "fil"), "camera.yaml", "a: 1\n", "unknown key 'fil'"),
+    (LENS.replace("}", ", rectified: true}"), "camera.yaml", COEFFICIENTS,
+     "camera.yaml:1:1: no camera found; expected a projection matrix such as P or P1; of other"),
     (LENS.replace("}", ", fishy: 1}"), "camera.yaml", "a: 1\n", "unknown key 'fishy'"),
 ]  # fmt: skip
 

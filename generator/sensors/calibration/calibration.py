@@ -152,11 +152,12 @@ class Calibration:
     def _known(self, name: str, known: list[str], kind: str) -> str:
         if name in known:
             return name
-        what = f"has no {kind} '{name}'" if name else f"has several {kind}s, or none: name one"
-        raise ValueError(
-            f"{self.file}, {self.kind}, {what}; expected one of {', '.join(known) or 'none'}"
-            f"{errors.did_you_mean(name, known)}"
-        )
+        place = f"{self.file}, {self.kind},"
+        if not known:
+            raise ValueError(f"{place} has no {kind}s; expected a file that has")
+        what = f"has no {kind} '{name}'" if name else f"has several {kind}s: name one"
+        near = errors.did_you_mean(name, known)
+        raise ValueError(f"{place} {what}; expected one of {', '.join(known)}{near}")
 
 
 def fail(node: Node, field_name: str, fact: str) -> NoReturn:

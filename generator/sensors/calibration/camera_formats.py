@@ -160,8 +160,9 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
         # OpenCV's sample stereo_calib writes R and T to a separate file.
         frames = _pair_frames(entries)
     if not cameras and not frames:
-        known = "projection matrix such as P" if rectified else "camera matrix such as K"
-        fact = f"no camera found; expected a {known}, {_MATRICES[0]} or M1, or R and T of a pair; "
+        pair = f"camera matrix such as K, {_MATRICES[0]} or M1, or R and T of a pair"
+        known = "projection matrix such as P or P1" if rectified else pair
+        fact = f"no camera found; expected a {known}; "
         fail(root, "", f"{fact}of other formats, type fx_px, fy_px, cx_px, cy_px as intrinsics")
     if "2" in cameras and not rectified:
         frames = _pair_frames(entries)
@@ -242,6 +243,10 @@ def _read_out(camera: CalibratedCamera, entries: Entries) -> CalibratedCamera:
         corner = [_whole(region, f"{axis}_offset") for axis in "xy"]
         width, height = (_whole(region, side) for side in ("width", "height"))
         size = (width, height) if width and height else size
+        whole = camera.size_px or size
+        if size and whole and any(at + n > m for at, n, m in zip(corner, size, whole, strict=True)):
+            fact = f"{size[0]} x {size[1]} at ({corner[0]}, {corner[1]}) is not inside"
+            fail(region, "roi", f"{fact} the image of {whole[0]} x {whole[1]} pixels")
     if size is not None:
         size = (size[0] // bins[0], size[1] // bins[1])
     (fx, fy), (cx, cy) = camera.focal_px, camera.center_px
