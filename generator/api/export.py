@@ -48,7 +48,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         workers: Processes; None = one per core, 0 = this process.
         force: Start although the disk is probably too small.
         on_progress: Called after each sample and shard.
-        resume_command: Command that error messages give for resuming.
+        resume_command: Command that error messages give for resuming; empty = there is none.
 
     Raises:
         StorageError: the folder holds no finished data set, or ``out`` cannot be written.

@@ -67,7 +67,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             its own; ``merge`` gathers the parts. None = all.
         cluster: Ray cluster that generates the shards; None = processes of this machine.
         on_progress: Called after each sample and shard.
-        resume_command: Command that error messages give for resuming.
+        resume_command: Command that error messages give for resuming; empty = there is none.
 
     Returns:
         Summary of the run, with identity and folder of the data set.

@@ -143,6 +143,7 @@ def _measure(source: str, changes: options.Changes, count: int) -> cost_estimate
                 overrides=(*changes["overrides"], "splits={train: 1, val: 0, test: 0}"),
                 without=changes["without"],
                 on_progress=note,
+                resume_command="",
             )
         except NoLabels as error:
             summary = error.summary

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from gen_data.cli.tables import print_tables
 from gen_data.core.errors import ConfigError, StorageError
-from gen_data.core.whole_files import write_whole
+from gen_data.core.whole_files import check_place, write_whole
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -90,6 +91,7 @@ def report(
     from rich.console import Console
     from threadpoolctl import threadpool_limits
 
+    _refuse_idle(compare_real is not None)
     is_stored = (folder / "plan.json").is_file()
     if compare_real is not None:
         if compare is not None:
@@ -102,6 +104,8 @@ def report(
         raise ConfigError(f"--scenes: {scenes} is negative; expected 0 or more")
     folders = [folder] if compare is None else [folder, compare]
     page = folder / PAGE if html is None and is_stored else html
+    if page is not None:
+        check_place(page, "--html")
     # Poses of scenes that are drawn again must have the last bits of the stored ones.
     with threadpool_limits(limits=1):
         sets = [_describe(one, scenes, len(folders), Console(stderr=True)) for one in folders]
@@ -115,6 +119,15 @@ def report(
         print_tables(console, described["tables"])
     if page is not None:
         click.echo(f"wrote {page}")
+
+
+def _refuse_idle(is_real: bool) -> None:
+    """Refuse options without an effect: some need ``--compare-real``, and one excludes it."""
+    source = click.get_current_context().get_parameter_source
+    for name in ("scenes",) if is_real else ("classes", "pictures", "n"):
+        if source(name) is ParameterSource.COMMANDLINE:
+            place = "with" if is_real else "without"
+            raise ConfigError(f"--{name}: has no effect {place} --compare-real; leave it out")
 
 
 def _describe(folder: Path, scenes: int, sets: int, console: "Console") -> dict[str, Any]:

@@ -1,9 +1,32 @@
 """Files that appear with all their bytes, or not at all: a full disk leaves no half of one."""
 
+import errno
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from gen_data.core.errors import StorageError
+
+
+def check_place(path: Path, option: str) -> None:
+    """Find out, before long work for a file, whether it can be written; missing folders may be.
+
+    Raises:
+        StorageError: the path is a folder, or its folder cannot be made or written to; ``option``
+            chooses another one.
+    """
+    try:
+        folder = next(parent for parent in path.absolute().parents if parent.exists())
+        if path.is_dir():
+            raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        if not folder.is_dir():
+            raise OSError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise OSError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+    except OSError as error:
+        fact = f"{error.filename}: {error.strerror}; choose another {option}"
+        raise StorageError(fact) from error
 
 
 @contextmanager

@@ -36,8 +36,9 @@ ROUNDING = 1e-5
 """Numbers of a scene that differ by less are equal: processors may differ in last bits, and poses
 are rounded to a micrometre."""
 
-EXPECTED_DRAWS = 50_000
-"""Draws that represent a declared distribution."""
+EXPECTED_PER_DRAW, EXPECTED_MIN, EXPECTED_MAX = 100, 2_000, 50_000
+"""Draws that represent a declared distribution: as many for each drawn value, within limits. A
+hundred times the values widen the limit of the comparison, ``sqrt(1/n + 1/m)``, by 0.5 %."""
 
 Draw = tuple[str, Distribution[Any], Any]
 """Name of a parameter, its distribution, and a drawn value."""
@@ -106,7 +107,9 @@ def draw_parameters(stored: StoredSamples, scenes_max: int) -> DrawnParameters:
         ConfigError, AssetError: the configuration or an asset of the data set is not available.
     """
     replay = replay_scenes(stored, scenes_max)
-    parameters = tuple(replay.parameters[name] for name in sorted(replay.parameters))
+    # Some parameters are drawn in rejected attempts only.
+    drawn = (replay.parameters[name] for name in sorted(replay.parameters))
+    parameters = tuple(parameter for parameter in drawn if parameter.values)
     for parameter in parameters:
         declared = {text: replay.distributions[parameter.name, text] for text in parameter.declared}
         parameter.expected = _expected_values(parameter, declared)
@@ -142,7 +145,8 @@ class Replay:
     """Draws scenes again, and keeps the values and the rejections.
 
     Attributes:
-        parameters: By name, without ``expected`` and ``limits``.
+        parameters: By name, without ``expected`` and ``limits``; without ``values`` if rejected
+            attempts alone drew them.
         distributions: Declared distributions by parameter and YAML.
         rejections: Numbers of rejected attempts by reason and remedy.
         per_scene: Samples of a scene.
@@ -339,12 +343,13 @@ def _observe_distribution(
 
 
 def _expected_values(parameter: Parameter, declared: Mapping[str, Distribution[Any]]) -> list[Any]:
-    """Values of the declared distributions, in proportion to their numbers of draws."""
+    """Values of the declared distributions, in proportion to their numbers of draws, at least 1."""
     total = parameter.declared.total()
+    wanted = min(max(EXPECTED_PER_DRAW * total, EXPECTED_MIN), EXPECTED_MAX)
     values: list[Any] = []
     for text, count in parameter.declared.items():
         rng = Streams(0, 0).rng(f"report/{parameter.name}/{text}")
-        for turn in range(max(1, round(EXPECTED_DRAWS * count / total))):
+        for turn in range(max(1, round(wanted * count / total))):
             # A sequence takes its values in turn.
             rng.index = turn
             values.append(declared[text].draw(rng))

@@ -372,9 +372,10 @@ def _describe_parameter(parameter: Parameter) -> list[Json]:
 def _compare_names(parameter: Parameter, numeric: bool) -> Json:
     values = {*parameter.values, *parameter.expected}
     ordered = sorted(values) if numeric else sorted(values, key=_name)
-    names = [_name(value) for value in ordered]
+    names = list(dict.fromkeys(map(_name, ordered)))
+    places = {name: place for place, name in enumerate(names)}
     rows = {
-        key: np.bincount([names.index(_name(v)) for v in column], minlength=len(names))
+        key: np.bincount([places[_name(v)] for v in column], minlength=len(names))
         for key, column in (("drawn", parameter.values), ("expected", parameter.expected))
     }
     steps = [np.cumsum(row / row.sum()) for row in rows.values()]

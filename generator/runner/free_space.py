@@ -60,11 +60,12 @@ class SpaceCheck:
         free = self._free_bytes()
         if free >= need + RESERVE_BYTES or samples == 0:
             return None
+        command = self.store.resume_command
+        advice = f"\n  After making room, resume with:\n    {command}" if command else ""
         error = StorageError(
             f"{self.store.root}: the other {samples} samples need about "
             f"{format_bytes(new_bytes)} and {format_bytes(free)} are free; stopped "
-            "before the disk is full.\n  After making room, resume with:\n"
-            f"    {self.store.resume_command}"
+            f"before the disk is full.{advice}"
         )
         error.__cause__ = full_disk()
         return error

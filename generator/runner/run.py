@@ -51,7 +51,8 @@ class Settings:
 
     Attributes:
         workers: Processes that generate shards; 0 generates them in this process.
-        resume_command: Command that error messages give for resuming.
+        resume_command: Command that error messages give for resuming; empty = there is none, as
+            the folder is temporary.
         progress: Called after each sample and shard.
         repair: Hash existing files before anything else, restore a damaged ``plan.json``, and move
             files that do not belong to the data set to ``run/quarantine``. Without it, damaged
@@ -121,7 +122,8 @@ def run(
         Interrupted: Ctrl-C or SIGTERM; committed shards stay.
     """
     store = open_store(out, settings.resume_command)
-    message = f"finished shards are kept; resume with:\n    {settings.resume_command}"
+    kept = f"finished shards are kept; resume with:\n    {settings.resume_command}"
+    message = kept if settings.resume_command else "nothing is kept"
     with Interruption(message) as interruption:
         with interruption.immediate(), store.errors():
             if settings.repair:

@@ -10,10 +10,10 @@ from itertools import pairwise
 from pathlib import Path
 
 from gen_data.core.errors import StorageError
-from gen_data.core.whole_files import write_whole
+from gen_data.core.whole_files import check_place, write_whole
 from gen_data.lab.carry_over.compare_real import CarryOver, compare_real, make_figures
 from gen_data.lab.carry_over.differences import VALUES_MIN, Row
-from gen_data.lab.carry_over.statistics import DARK_GREY, HEIGHTS_PX
+from gen_data.lab.carry_over.statistics import DARK_GREY, HEIGHTS_PX, OF_PICTURES
 from gen_data.report.html_page import format_document, format_table
 from gen_data.report.report_tables import Table
 
@@ -45,6 +45,8 @@ def report_real(
 
     from gen_data.cli.tables import print_tables
 
+    if page is not None:
+        check_place(page, "--html")
     with Console(stderr=True).status("") as status:
         found = compare_real(
             str(source), folder, classes=classes, pictures=pictures, n=n, progress=status.update
@@ -90,13 +92,22 @@ def make_tables(found: CarryOver) -> tuple[Table, ...]:
         changes.setdefault((row.direction, "; ".join(change)), []).append(_name(row))
     fields = tuple((", ".join(names), *key) for key, names in changes.items())
     tables = (
-        _rows("Differences", differing or ["none"], _NOTE),
+        _rows("Differences", differing or [_no_difference(found)], _NOTE),
         Table(FIELDS, ("statistic", "ours are", "fields"), fields, _FIELDS_NOTE),
         _heights(found),
         _rows(ALIKE, [row for row in found.rows if not row.differs], ""),
         _files(found),
     )
     return tuple(table for table in tables if table.rows)
+
+
+def _no_difference(found: CarryOver) -> str:
+    """Why no row differs."""
+    if not found.rows:
+        return f"nothing was compared: every statistic has fewer than {VALUES_MIN} values"
+    if {row.quantity for row in found.rows} <= OF_PICTURES.keys():
+        return "none of whole pictures; no object was compared"
+    return "none"
 
 
 def _rows(title: str, rows: Sequence[Row | str], note: str) -> Table:
@@ -137,7 +148,7 @@ def _files(found: CarryOver) -> Table:
     sides = (found.real, found.ours)
     rows = [("pictures", *(str(len(side.pictures)) for side in sides))]
     for reason in dict.fromkeys((*found.real.skipped, *found.ours.skipped)):
-        rows.append((f"skipped: {reason}", *(str(side.skipped.get(reason, 0)) for side in sides)))
+        rows.append((f"remark: {reason}", *(str(side.skipped.get(reason, 0)) for side in sides)))
     ignored = [sum(o.is_ignored for p in side.pictures for o in p.objects) for side in sides]
     rows.append(("ignored regions", *map(str, ignored)))
     for fact, listed in (

@@ -156,14 +156,14 @@ def _open_ours(
             folder = Path(scratch) / "sample"
             entry = json.dumps([{"type": layout}])
             every_scene = (f"exporters={entry}", "views_per_scene=1", "steps_per_scene=1")
-            generate(source, n, out=folder, overrides=every_scene)
+            generate(source, n, out=folder, overrides=every_scene, resume_command="")
         exported = folder
         if not (folder / layout).is_dir():
             from gen_data.api.export import export
 
             progress(f"{source} as {layout}")
             exported = Path(scratch) / "exported"
-            export(folder, [layout], exported)
+            export(folder, [layout], exported, resume_command="")
         yield _stored(folder, read_real(exported / layout, None, layout=layout, most=pictures))
 
 

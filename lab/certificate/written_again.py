@@ -30,7 +30,7 @@ def check_written_again(examined: Examined) -> Iterator[Finding]:
     scratch = store.scratch_dir()
     try:
         exporters = ready_exporters(config, stored.info, examined.library)
-        export(stored, config, exporters, scratch / "again", Settings(resume_command="certify"))
+        export(stored, config, exporters, scratch / "again", Settings())
         again = seal.read_sums(scratch / "again").digests
     finally:
         shutil.rmtree(scratch)

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.core.errors import ConfigError, StorageError
-from gen_data.core.whole_files import write_whole
+from gen_data.core.whole_files import check_place, write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from gen_data.lab.matching.results import Match
 
@@ -25,6 +25,7 @@ def match(  # noqa: PLR0913  (keywords of one front door)
     scenes: int = 48,
     camera: str = "",
     lidar: str = "",
+    force: bool = False,
     on_progress: "Callable[[str], None] | None" = None,
 ) -> "Match":
     """Fit the sensors of a configuration to a folder of unlabelled recordings.
@@ -43,6 +44,7 @@ def match(  # noqa: PLR0913  (keywords of one front door)
         scenes: Number of scenes of the configuration to simulate.
         camera: Camera to fit; empty = the first.
         lidar: Laser scanner to fit; empty = the first.
+        force: Replace files that exist.
         on_progress: Called with the name of each step when it begins.
 
     Returns:
@@ -50,7 +52,8 @@ def match(  # noqa: PLR0913  (keywords of one front door)
 
     Raises:
         ConfigError: the configuration is wrong, or an argument.
-        StorageError: the folder holds nothing that can be read, or ``out`` cannot be written.
+        StorageError: the folder holds nothing that can be read, or a file exists or cannot be
+            written, which is found before the fit.
     """
     from threadpoolctl import threadpool_limits
 
@@ -65,6 +68,8 @@ def match(  # noqa: PLR0913  (keywords of one front door)
         raise ConfigError(f"{source}: is a folder; expected a configuration to extend")
     if path.resolve() == Path(source).resolve():
         raise ConfigError(f"--out: {path} is the configuration itself; choose another name")
+    targets = [path, path.with_suffix(".json"), path.with_suffix(".html")]
+    _check_places(targets, force)
     with threadpool_limits(limits=1):
         found = match_recordings(
             Path(folder),
@@ -79,16 +84,22 @@ def match(  # noqa: PLR0913  (keywords of one front door)
     figures = json.dumps(make_figures(found), ensure_ascii=False, indent=1, allow_nan=False)
     text = format_config(found, path)
     _refuse_invalid(text, path, source)
-    files = {
-        path: text,
-        path.with_suffix(".json"): figures + "\n",
-        path.with_suffix(".html"): format_match_page(found, Path(source).stem),
-    }
+    texts = [text, figures + "\n", format_match_page(found, Path(source).stem)]
     try:
-        write_whole({target: text.encode() for target, text in files.items()})
+        write_whole({k: text.encode() for k, text in zip(targets, texts, strict=True)})
     except OSError as error:
         raise StorageError(f"{error.filename}: {error.strerror}; choose another --out") from error
     return found
+
+
+def _check_places(targets: "Sequence[Path]", force: bool) -> None:
+    """Refuse files that exist, unless ``force`` is set, or that cannot be written."""
+    for target in targets:
+        check_place(target, "--out")
+        if target.exists() and not force:
+            raise StorageError(
+                f"{target}: exists; choose another --out, or replace it with --force"
+            )
 
 
 def _refuse_invalid(text: str, path: Path, source: str) -> None:

@@ -1,10 +1,11 @@
 """Boxes in label files of users, in the layouts of COCO, KITTI, YOLO and Pascal VOC."""
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from xml.etree import ElementTree
 
 import yaml
@@ -16,6 +17,14 @@ OCCLUSION_LEVELS = ("visible", "partly occluded", "largely occluded")
 """KITTI's levels 0, 1 and 2; its level 3 is "unknown"."""
 
 Box = tuple[float, float, float, float]
+V = TypeVar("V")
+
+SHOWN_MAX = 60
+"""Letters of a wrong value in a message."""
+SHARE_MAX = 2.0
+"""Boxes of YOLO with larger values are in pixels: in shares, they would be far outside."""
+_KITTI_2D = ("truncated", "occluded", "alpha", "left", "top", "right", "bottom")
+_KITTI_3D = ("height", "width", "length", "x", "y", "z", "rotation_y")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,43 +79,130 @@ class CocoLabels:
 
 
 def read_coco(path: Path) -> CocoLabels:
-    """Read a file of annotations. Raises StorageError if it does not have COCO's layout."""
+    """Read a file of annotations.
+
+    Raises:
+        StorageError: it does not have COCO's layout; with the row, the field and its value.
+    """
     try:
-        content = json.loads(path.read_bytes())
-        names = {row["id"]: str(row["name"]) for row in content["categories"]}
-        objects: dict[Any, list[RealObject]] = {row["id"]: [] for row in content["images"]}
-        for kind, name in (("images", "file_name"), ("categories", "name")):
-            rows = {(row["id"], row.get(name)) for row in content[kind]}
-            if len(rows) > len({number for number, _ in rows}):
-                raise ValueError(f"{kind} share an id; expected one each")
-        is_level = any(_number(row.get("occlusion")) > 1.0 for row in content["annotations"])
-        empty = 0
-        for row in content["annotations"]:
-            x, y, width, height = map(float, row["bbox"])
-            if not (width > 0 and height > 0):
-                empty += 1
-                continue
-            objects[row["image_id"]].append(
-                RealObject(
-                    names[row["category_id"]],
-                    (x, y, x + width, y + height),
-                    bool(row.get("iscrowd", 0)),
-                    _occlusion(row.get("occlusion"), is_level),
-                    _share(row.get("truncation")),
-                )
+        return _coco_labels(json.loads(path.read_bytes()))
+    except (OSError, ValueError) as error:
+        raise StorageError(f"{path}: not annotations in COCO's format: {error}") from error
+
+
+def _coco_labels(content: Any) -> CocoLabels:
+    names: dict[Any, str] = {}
+    for place, row in _rows(content, "categories"):
+        name = _field(place, row, "name", str, "a name")
+        if names.setdefault(_id(place, row), name) != name:
+            raise ValueError(f"{place}: categories share an id; expected one each")
+    listed: dict[Any, Any] = {}
+    for place, row in _rows(content, "images"):
+        file_name = row.get("file_name")
+        if listed.setdefault(_id(place, row), file_name) != file_name:
+            raise ValueError(f"{place}: images share an id; expected one each")
+    objects: dict[Any, list[RealObject]] = {number: [] for number in listed}
+    annotations = _rows(content, "annotations")
+    is_level = any(_number(row.get("occlusion")) > 1.0 for _, row in annotations)
+    empty = 0
+    for place, row in annotations:
+        box = _field(place, row, "bbox", _coco_box, "four numbers: x, y, width, height")
+        if not has_area(box):
+            empty += 1
+            continue
+        _field(place, row, "image_id", objects.__getitem__, "the id of an image").append(
+            RealObject(
+                _field(place, row, "category_id", names.__getitem__, "the id of a category"),
+                box,
+                bool(row.get("iscrowd", 0)),
+                _occlusion(row.get("occlusion"), is_level),
+                _share(row.get("truncation")),
             )
-        images = tuple(
-            CocoImage(
-                row["id"],
-                _posix(row.get("file_name", "")),
-                (int(row.get("width", 0)), int(row.get("height", 0))),
-                tuple(objects[row["id"]]),
-            )
-            for row in content["images"]
         )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise StorageError(f"{path}: not annotations in COCO's format: {error!r}") from error
+    images = tuple(
+        CocoImage(
+            row["id"],
+            _posix(row.get("file_name", "")),
+            (_pixels(place, row, "width"), _pixels(place, row, "height")),
+            tuple(objects[row["id"]]),
+        )
+        for place, row in _rows(content, "images")
+    )
     return CocoLabels(images, {name: number for number, name in names.items()}, empty)
+
+
+def _rows(content: Any, kind: str) -> list[tuple[str, Mapping[str, Any]]]:
+    """Rows of one of COCO's lists, with their places in words."""
+    rows = content.get(kind) if isinstance(content, dict) else None
+    if not isinstance(rows, list):
+        raise ValueError(f"there is no list '{kind}'")
+    placed: list[tuple[str, Mapping[str, Any]]] = []
+    for number, row in enumerate(rows):
+        if not isinstance(row, dict):
+            raise ValueError(f"{kind}[{number}] is {_shown(row)}; expected fields in {{}}")
+        stated = f" (id {_shown(row['id'])})" if "id" in row else ""
+        placed.append((f"{kind}[{number}]{stated}", row))
+    return placed
+
+
+def _field(
+    place: str, row: Mapping[str, Any], name: str, read: Callable[[Any], V], expected: str
+) -> V:
+    """The value of a field. Raises ValueError if it is missing, or ``read`` refuses it."""
+    if name not in row:
+        raise ValueError(f"{place}: there is no '{name}'; expected {expected}")
+    try:
+        return read(row[name])
+    except (KeyError, TypeError, ValueError, OverflowError):
+        fact = f"{place}: {name} is {_shown(row[name])}"
+        raise ValueError(f"{fact}; expected {expected}") from None
+
+
+def _shown(value: Any) -> str:
+    """A value of JSON in a line, cut."""
+    text = json.dumps(value)
+    return text if len(text) <= SHOWN_MAX else f"{text[:SHOWN_MAX]}..."
+
+
+def _id(place: str, row: Mapping[str, Any]) -> Any:
+    def read(value: Any) -> Any:
+        hash(value)
+        return value
+
+    return _field(place, row, "id", read, "a number")
+
+
+def _pixels(place: str, row: Mapping[str, Any], side: str) -> int:
+    """Width or height; 0 = not stated."""
+    return _field(place, {side: row.get(side) or 0}, side, int, "a number of pixels")
+
+
+def _coco_box(value: Any) -> Box:
+    x, y, width, height = (_finite(number, "bbox") for number in value)
+    return (x, y, x + width, y + height)
+
+
+def _finite(value: Any, field: str) -> float:
+    """A number. Raises ValueError with the field and its value."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{field} is {_shown(value)}; expected a number")
+    return number
+
+
+def has_area(box: Box, size_px: tuple[float, float] = (math.inf, math.inf)) -> bool:
+    """Whether a box has an area, inside an image if its width and height are given.
+
+    Without a size, places left of an image and above it count as well.
+    """
+    x0, y0, x1, y1 = box
+    if not (x0 < x1 and y0 < y1):
+        return False
+    width, height = size_px
+    return math.isinf(width) or (x1 > 0.0 and y1 > 0.0 and x0 < width and y0 < height)
 
 
 def _posix(name: object) -> str:
@@ -128,13 +224,17 @@ def read_kitti(path: Path) -> tuple[RealObject, ...]:
 
 
 def _kitti_object(place: str, line: str) -> RealObject:
+    kind, *texts = line.split()[:15]
     try:
-        kind, truncated, level, _, *sides = line.split()[:8]
-        x0, y0, x1, y1 = map(float, sides)
-        outside, occluded = float(truncated), int(float(level))
-        metric = tuple(map(float, line.split()[8:15]))
+        if len(texts) < len(_KITTI_2D):
+            columns = f"{len(texts) + 1} columns; expected 15, or 8 without a box in space"
+            raise ValueError(columns)
+        # The viewing angle follows from the others.
+        fields = (f for f in zip(_KITTI_2D + _KITTI_3D, texts, strict=False) if f[0] != "alpha")
+        outside, level, x0, y0, x1, y1, *metric = (_finite(text, name) for name, text in fields)
     except ValueError as error:
         raise StorageError(f"{place}: not a label in KITTI's format: {error}") from error
+    occluded = int(level)
     # KITTI's sides are inclusive pixel numbers.
     box = (x0, y0, x1 + 1.0, y1 + 1.0)
     if kind == "DontCare":
@@ -147,7 +247,7 @@ def _kitti_object(place: str, line: str) -> RealObject:
         OCCLUSION_LEVELS[occluded] if known else "",
         outside if outside >= 0.0 else None,
         # Labels of 2D boxes alone have no further columns, or -1 as sizes.
-        UprightBox(metric[:3], metric[3:6], metric[6])
+        UprightBox((metric[0], metric[1], metric[2]), (metric[3], metric[4], metric[5]), metric[6])
         if len(metric) == 7 and metric[0] > 0.0
         else None,
     )
@@ -164,32 +264,63 @@ def read_yolo_classes(path: Path) -> tuple[list[str], bool]:
         if path.suffix not in (".yaml", ".yml"):
             return [line.strip() for line in text.rstrip().splitlines()], False
         content = yaml.safe_load(text)
-        names = content["names"]
-        listed = [names[k] for k in range(len(names))]
-        return [str(name) for name in listed], "kpt_shape" in content
-    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
-        raise StorageError(f"{path}: no list of classes in YOLO's format: {error!r}") from error
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise StorageError(f"{path}: no file of YOLO's classes: {_yaml_fact(error)}") from error
+    stated = content.get("names") if isinstance(content, dict) else None
+    names = stated
+    if isinstance(stated, dict) and stated.keys() == set(range(len(stated))):
+        names = [stated[k] for k in range(len(stated))]
+    if not isinstance(names, list):
+        fact = "there are no 'names'" if stated is None else f"names is {str(stated)[:SHOWN_MAX]}"
+        raise StorageError(
+            f"{path}: no file of YOLO's classes: {fact}; expected a list, or numbers from 0 with "
+            "names, such as names: [cup, plate]"
+        )
+    return [str(name) for name in names], "kpt_shape" in content
 
 
-def yolo_images(path: Path, split: str = "") -> list[Path]:
-    """Folders, lists and images that ``data.yaml`` names as its splits, where they exist.
+def _yaml_fact(error: Exception) -> str:
+    """Line and fact of an error of syntax."""
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
+        return f"line {error.problem_mark.line + 1}: {error.problem}"
+    return str(error)
+
+
+@dataclass(frozen=True)
+class YoloSplits:
+    """Splits of a ``data.yaml``.
+
+    Attributes:
+        places: Folders, lists and images that it names, where they exist.
+        missing: Key and name of the others.
+    """
+
+    places: Sequence[Path] = ()
+    missing: Sequence[tuple[str, str]] = ()
+
+
+def yolo_splits(path: Path, split: str = "") -> YoloSplits:
+    """Splits of a file that ``read_yolo_classes`` has read; none of a list of classes.
 
     ``split`` is a part of the name of the wanted ones, empty = all. Names refer to its ``path``,
     or to its own folder where there is no such path.
     """
     if path.suffix not in (".yaml", ".yml"):
-        return []
+        return YoloSplits()
     content = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
     base = path.parent / str(content.get("path") or "")
     base = base if base.is_dir() else path.parent
-    found = []
+    places, missing = [], []
     for key in ("train", "val", "test"):
         stated = (content.get(key) or []) if split in key else []
-        for name in [stated] if isinstance(stated, str) else stated:
+        for name in map(str, stated if isinstance(stated, list) else [stated]):
             # Roboflow writes ../train/images for train/images.
-            places = (base / str(name), base / str(name).removeprefix("../"))
-            found += list(filter(Path.exists, places))[:1]
-    return list(dict.fromkeys(found))
+            found = next(filter(Path.exists, (base / name, base / name.removeprefix("../"))), None)
+            if found is None:
+                missing.append((key, name))
+            else:
+                places.append(found)
+    return YoloSplits(list(dict.fromkeys(places)), missing)
 
 
 def read_yolo(path: Path, names: Sequence[str], has_keypoints: bool) -> tuple[RealObject, ...]:
@@ -210,7 +341,7 @@ def read_yolo(path: Path, names: Sequence[str], has_keypoints: bool) -> tuple[Re
         if not line.strip():
             continue
         try:
-            kind, *values = map(float, line.split())
+            kind, *values = (_finite(t, f"column {k}") for k, t in enumerate(line.split(), 1))
             if len(values) == 4 or has_keypoints:
                 x, y, w, h = values[:4]
                 box = (x - 0.5 * w, y - 0.5 * h, x + 0.5 * w, y + 0.5 * h)
@@ -221,6 +352,11 @@ def read_yolo(path: Path, names: Sequence[str], has_keypoints: bool) -> tuple[Re
                 raise ValueError(f"{len(values) + 1} columns")
             if not 0 <= int(kind) < len(names):
                 raise ValueError(f"class {kind:g}, expected 0 to {len(names) - 1}")
+            if (most := max(map(abs, box))) > SHARE_MAX:
+                raise ValueError(
+                    f"its box reaches to {most:g}; expected shares of the image's width and "
+                    "height: divide pixels by them"
+                )
         except ValueError as error:
             raise StorageError(f"{path}:{number}: not a label in YOLO's format: {error}") from error
         objects.append(RealObject(names[int(kind)], box))
@@ -235,7 +371,9 @@ def read_voc(path: Path) -> tuple[str, tuple[int, int], tuple[RealObject, ...]]:
     """
     try:
         root = ElementTree.parse(path).getroot()
-        size = [int(root.findtext(f"size/{side}") or 0) for side in ("width", "height")]
+        size = [
+            int(_finite(root.findtext(f"size/{side}") or 0, side)) for side in ("width", "height")
+        ]
         objects = tuple(_voc_object(item) for item in root.iter("object"))
     except (OSError, ValueError, ElementTree.ParseError) as error:
         raise StorageError(f"{path}: not annotations in VOC's format: {error}") from error
@@ -244,10 +382,10 @@ def read_voc(path: Path) -> tuple[str, tuple[int, int], tuple[RealObject, ...]]:
 
 def _voc_object(item: ElementTree.Element) -> RealObject:
     name = item.findtext("name")
-    sides = [item.findtext(f"bndbox/{side}") for side in ("xmin", "ymin", "xmax", "ymax")]
-    if name is None or None in sides:
+    sides = {side: item.findtext(f"bndbox/{side}") for side in ("xmin", "ymin", "xmax", "ymax")}
+    if name is None or None in sides.values():
         raise ValueError("an object without a name or a box")
-    x0, y0, x1, y1 = (float(side or "") for side in sides)
+    x0, y0, x1, y1 = (_finite(text, f"{side} of '{name}'") for side, text in sides.items())
     occluded, truncated = item.findtext("occluded"), item.findtext("truncated")
     return RealObject(
         name,

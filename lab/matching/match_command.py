@@ -39,6 +39,7 @@ gen-data --config matched.yaml --n 1000
 @click.option(
     "--lidar", default="", metavar="NAME", help="Laser scanner to fit [default: the first]."
 )
+@click.option("--force", is_flag=True, help="Replace existing files.")
 def match(
     folder: Path,
     config: str,
@@ -48,6 +49,7 @@ def match(
     scenes: int,
     camera: str,
     lidar: str,
+    force: bool,
 ) -> None:
     """Fit a configuration to recordings."""
     from dataclasses import asdict
@@ -69,6 +71,7 @@ def match(
             scenes=scenes,
             camera=camera,
             lidar=lidar,
+            force=force,
             # A file or another program gets lines.
             on_progress=status.update if console.is_terminal else partial(click.echo, err=True),
         )

@@ -9,7 +9,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,7 +22,7 @@ from gen_data.core.asset_types import UInt8
 from gen_data.core.capture import POINT, Channel
 from gen_data.core.errors import AssetError, StorageError
 from gen_data.lab.matching import label_files, point_files
-from gen_data.lab.matching.recordings import ImageLabels, Photo, Scan
+from gen_data.lab.matching.recordings import Box, ImageLabels, Photo, Scan
 
 T = TypeVar("T")
 
@@ -317,9 +317,23 @@ def read_labels(
         sizes_px: Sizes of photographs by name, as KITTI's labels state none.
         inventory: Counts labels that cannot be used.
     """
-    if files.coco:
-        return list(_read_coco(files.coco, inventory))
-    return list(_read_kitti(files.kitti, sizes_px, inventory))
+    listed = list(
+        _read_coco(files.coco, inventory)
+        if files.coco
+        else _read_kitti(files.kitti, sizes_px, inventory)
+    )
+    inside = [replace(labels, boxes=tuple(_inside(labels))) for labels in listed]
+    if lost := sum(len(labels.boxes) for labels in listed) - sum(len(i.boxes) for i in inside):
+        inventory.notes["label files"] = f"{lost} boxes outside of their images left out"
+    return inside
+
+
+def _inside(labels: ImageLabels) -> Iterator[Box]:
+    """Boxes with an area inside the image."""
+    for box in labels.boxes:
+        _, x, y, w, h = box
+        if label_files.has_area((x, y, x + w, y + h), (labels.width_px, labels.height_px)):
+            yield box
 
 
 def _read_coco(paths: Iterable[Path], inventory: Inventory) -> Iterator[ImageLabels]:

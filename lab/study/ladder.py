@@ -105,7 +105,14 @@ def build(
     folders = [ladder.folder(out, step) for step in range(len(overrides))]
     for step, (folder, changed) in enumerate(zip(folders, overrides, strict=True)):
         report(f"step {step}: {changed[0]}")
-        generate(config, n, out=folder, workers=workers, overrides=changed)
+        generate(
+            config,
+            n,
+            out=folder,
+            workers=workers,
+            overrides=changed,
+            resume_command="the same command",
+        )
     return _count_same(folders)
 
 

@@ -10,14 +10,16 @@ from typing import Any
 
 from gen_data.assets.image_decoding import PHOTO_SUFFIXES, UNREAD, why_unread
 from gen_data.core.asset_types import UInt8
-from gen_data.core.errors import AssetError, ConfigError, StorageError, list_names
+from gen_data.core.errors import AssetError, ConfigError, StorageError, did_you_mean, list_names
 from gen_data.lab.matching import label_files
 from gen_data.lab.matching.label_files import RealObject
 from gen_data.lab.matching.real_files import choose_evenly, files_below, read_picture, read_rgb
 
-_UNSTATED = (0, 0)
 _IMAGES = re.compile(rb'"(images|annotations)"\s*:\s*\[\s*[{\]]')
 """A list of objects: plans of data sets have lists of names there."""
+_NAMES = re.compile(rb"""(^|[{,])\s*["']?names["']?\s*:""", re.MULTILINE)
+_SPLITS = re.compile(rb"""^{?["']?(train|val|nc)["']?\s*:""", re.MULTILINE)
+"""Keys of the ``data.yaml`` of YOLO."""
 _AMBIGUOUS = "image whose name several files have"
 _WORD_MIN = 3
 """Letters from which on the beginning of a split's name stands for it: ``val`` for ``valid``."""
@@ -152,6 +154,9 @@ def read_real(
     for name, find in LAYOUTS.items():
         if layout in ("", name) and (read := find(folder, split, most)):
             return replace(read(), layout=name)
+    for path in _yolo_yamls(folder) if layout in ("", "yolo") else ():
+        if path.stem == "data" or _SPLITS.search(path.read_bytes()):
+            label_files.read_yolo_classes(path)
     raise ConfigError(
         f"{folder}: there are no labels; expected annotations/*.json in COCO's format, label_2 "
         "and image_2 in KITTI's, labels and data.yaml in YOLO's, or Annotations and JPEGImages "
@@ -169,7 +174,7 @@ def check_judges(real: RealSet) -> None:
         reasons = ", ".join(f"{count} x {reason}" for reason, count in real.skipped.items())
         raise ConfigError(
             f"{real.source}: 1 picture can be used; expected at least 2, to give scores an "
-            f"interval, and better 200 (skipped: {reasons or 'none'})"
+            f"interval, and better 200; skipped: {reasons or 'none'}"
         )
     if not any(not thing.is_ignored for picture in real.pictures for thing in picture.objects):
         raise ConfigError(f"{real.source}: has no labelled object; expected some to be found")
@@ -209,13 +214,16 @@ def _find_kitti(folder: Path, split: str | None, most: int | None) -> Found:
 
 def _find_yolo(folder: Path, split: str | None, most: int | None) -> Found:
     for root in (folder, folder / "detect", folder / "yolo/detect"):
-        files = [*sorted(root.glob("*.yaml")), *sorted(root.glob("*.yml"))]
-        files = [path for path in files if b"names:" in path.read_bytes()]
+        files = [path for path in _yolo_yamls(root) if _NAMES.search(path.read_bytes())]
         files += [root / name for name in ("classes.txt", "labels/classes.txt", "obj.names")]
         classes = next(filter(Path.is_file, files), None)
         if classes is not None:
             return partial(_read_yolo, root, classes, split or "", most)
     return None
+
+
+def _yolo_yamls(root: Path) -> list[Path]:
+    return [*sorted(root.glob("*.yaml")), *sorted(root.glob("*.yml"))]
 
 
 def _find_voc(folder: Path, split: str | None, most: int | None) -> Found:
@@ -283,14 +291,14 @@ class _Frame:
     """A picture that is to be read; see ``RealPicture``.
 
     Attributes:
-        stated_px: Size that the labels state.
+        stated_px: Size that the labels state; 0 = not stated.
         is_relative: Boxes are in shares of width and height.
     """
 
     image_id: int
     path: Path
     objects: tuple[RealObject, ...]
-    stated_px: tuple[int, int] = _UNSTATED
+    stated_px: tuple[int, int] = (0, 0)
     is_relative: bool = False
     scan: Path | None = None
 
@@ -298,7 +306,7 @@ class _Frame:
 def _read_coco(root: Path, paths: Sequence[Path], most: int | None) -> RealSet:
     frames: list[_Frame] = []
     skipped, ids = Counter[str](), dict[str, int]()
-    known = _images_by_name(root)
+    known, ambiguous = _images_by_name(root), list[str]()
     for path in paths:
         labels = label_files.read_coco(path)
         ids |= labels.category_ids
@@ -307,10 +315,12 @@ def _read_coco(root: Path, paths: Sequence[Path], most: int | None) -> RealSet:
         for image in labels.images:
             found = _find_image(root, path, image.file_name, known)
             if len(found) > 1:
-                skipped[_AMBIGUOUS] += 1
+                ambiguous.append(image.file_name)
             else:
                 file = found[0] if found else root / image.file_name
                 frames.append(_Frame(image.image_id, file, image.objects, image.size_px))
+    if ambiguous:
+        skipped[f"{_AMBIGUOUS} (such as {ambiguous[0]})"] = len(ambiguous)
     frames = _join_listed(frames, skipped)
     # Ids of some tools are texts.
     by_id = sorted(
@@ -388,7 +398,8 @@ def _read_kitti(root: Path, most: int | None) -> RealSet:
 def _read_yolo(root: Path, classes: Path, split: str, most: int | None) -> RealSet:
     names, has_keypoints = label_files.read_yolo_classes(classes)
     below = files_below(root)
-    places = label_files.yolo_images(classes, split)
+    splits = label_files.yolo_splits(classes, split)
+    places = splits.places
     if not places:
         _refuse_split(classes, split)
     if places:
@@ -402,6 +413,11 @@ def _read_yolo(root: Path, classes: Path, split: str, most: int | None) -> RealS
     # LabelImg puts its list of classes next to the labels.
     labels = {path for path in labels if path != classes and path.name != "classes.txt"}
     skipped, frames = Counter[str](), []
+    known = {path.parent.relative_to(root).as_posix() for path in _images_among(below)}
+    instead = "" if places else "; all images below are read"
+    for key, name in splits.missing:
+        nearest = did_you_mean(name, known)
+        skipped[f"{key} of {classes.name}: '{name}', which is missing{nearest}{instead}"] += 1
     for number, path in enumerate(sorted(labels | images.keys()), 1):
         if path not in labels and not why_unread(images[path]):
             skipped["image without a label file, read as one without objects"] += 1
@@ -478,28 +494,38 @@ def _readable(
     chosen = choose_evenly(frames, len(frames) if most is None else most)
     if len(chosen) < len(frames):
         skipped["picture beyond the largest number"] += len(frames) - len(chosen)
+    left_out: dict[str, list[str]] = {}
     for frame in chosen:
-        if not frame.path.is_file():
-            skipped["image that is missing"] += 1
+        found = _read_frame(frame)
+        if isinstance(found, str):
+            left_out.setdefault(found, []).append(frame.path.name)
             continue
-        if why := why_unread(frame.path):
-            skipped[f"image: {why}"] += 1
-            continue
-        try:
-            pixels, remarks = read_picture(frame.path)
-        except AssetError:
-            skipped["image that cannot be read"] += 1
-            continue
-        height, width = pixels.shape[:2]
-        if frame.stated_px not in (_UNSTATED, (width, height)):
-            skipped["image of another size than its labels state"] += 1
-            continue
-        skipped.update(f"part of an image that is read: {text}" for text in remarks)
+        width, height, remarks = found
+        skipped.update(f"image that is read, but: {text}" for text in remarks)
         objects = _scaled(frame.objects, width, height) if frame.is_relative else frame.objects
-        if empty := sum(not _has_area(thing) for thing in objects):
-            skipped["object with an empty box"] += empty
-            objects = tuple(filter(_has_area, objects))
-        yield RealPicture(frame.image_id, frame.path, (width, height), objects, frame.scan)
+        kept = tuple(o for o in objects if label_files.has_area(o.box, (width, height)))
+        empty = sum(not label_files.has_area(thing.box) for thing in objects)
+        outside = len(objects) - len(kept) - empty
+        counts = {"object with an empty box": empty, "object outside of its image": outside}
+        skipped.update({reason: count for reason, count in counts.items() if count})
+        yield RealPicture(frame.image_id, frame.path, (width, height), kept, frame.scan)
+    skipped.update({f"{why} (such as {names[0]})": len(names) for why, names in left_out.items()})
+
+
+def _read_frame(frame: _Frame) -> tuple[int, int, tuple[str, ...]] | str:
+    """Width, height, and remarks on the image; or why it is left out."""
+    if not frame.path.is_file():
+        return "image that is missing"
+    if why := why_unread(frame.path):
+        return f"image: {why}"
+    try:
+        pixels, remarks = read_picture(frame.path)
+    except AssetError:
+        return "image that cannot be read"
+    height, width = pixels.shape[:2]
+    if any(a not in (0, b) for a, b in zip(frame.stated_px, (width, height), strict=True)):
+        return "image of another size than its labels state"
+    return width, height, remarks
 
 
 def _scaled(objects: Iterable[RealObject], width: int, height: int) -> tuple[RealObject, ...]:
@@ -510,16 +536,11 @@ def _scaled(objects: Iterable[RealObject], width: int, height: int) -> tuple[Rea
     )
 
 
-def _has_area(thing: RealObject) -> bool:
-    x0, y0, x1, y1 = thing.box
-    return x0 < x1 and y0 < y1
-
-
 def _checked(real: RealSet) -> RealSet:
     if not real.pictures:
         reasons = ", ".join(f"{count} x {reason}" for reason, count in real.skipped.items())
         raise StorageError(
-            f"{real.source}: no picture can be used ({reasons or 'it lists none'}); expected the "
+            f"{real.source}: no picture can be used: {reasons or 'it lists none'}; expected the "
             "images that the labels name, below the same folder"
         )
     return real

@@ -93,7 +93,7 @@ def _skipped(real: RealSet) -> Table:
     rows = [[f"pictures of {w} x {h}", str(count)] for (w, h), count in sizes.most_common(5)]
     if len(sizes) > 5:
         rows.append(["pictures of other sizes", str(sum(c for _, c in sizes.most_common()[5:]))])
-    rows += [[f"skipped: {reason}", str(count)] for reason, count in real.skipped.items()]
+    rows += [[f"remark: {reason}", str(count)] for reason, count in real.skipped.items()]
     return {"title": "read files", "header": ["", "count"], "rows": rows, "note": str(real.source)}
 
 
@@ -104,4 +104,4 @@ def _ignore(line: str) -> None:
 def _summary(real: RealSet) -> list[str]:
     objects = sum(not thing.is_ignored for p in real.pictures for thing in p.objects)
     lines = [f"{real.source}: {len(real.pictures)} pictures, {objects} objects"]
-    return lines + [f"  skipped {count} x {reason}" for reason, count in real.skipped.items()]
+    return lines + [f"  {count} x {reason}" for reason, count in real.skipped.items()]

@@ -241,6 +241,6 @@ def test_photographs_of_match_and_study_have_the_colours_of_their_profiles(tmp_p
         np.testing.assert_allclose(photo.rgb[0, 0], color, atol=0.6)
     assert inventory.notes["photographs"] == f"2 of 80 x 80 px; 1: {UNUSED}"
     real = real_pictures.read_real(tmp_path)
-    assert real.skipped == {f"part of an image that is read: {UNUSED}": 1}
+    assert real.skipped == {f"image that is read, but: {UNUSED}": 1}
     first = real_pictures.read_image(real.pictures[0].path)
     np.testing.assert_allclose(first[0, 0], AS_P3, atol=0.6)

@@ -10,6 +10,7 @@ from click.testing import CliRunner, Result
 
 from gen_data.cli.report_command import report
 from gen_data.core.errors import ConfigError, GenDataError, NoLabels, StorageError
+from gen_data.lab.carry_over.carry_over_report import make_tables
 from gen_data.lab.carry_over.compare_real import CarryOver, compare_real
 from tests.carry_over.labelled import write_coco
 
@@ -94,7 +95,7 @@ def test_every_unusable_folder_has_one_error_with_its_exit_code(real: Path, tmp_
     for folder, kind, text in (
         ("reall", StorageError, "there is no folder"),
         ("empty", ConfigError, "there are no labels"),
-        ("bare", StorageError, "no picture can be used (3 x image that is missing)"),
+        ("bare", StorageError, "be used: 3 x image that is missing (such as 0.png);"),
         ("blank", NoLabels, "its labels have no object"),
     ):
         error = error_of(real, "--compare-real", tmp_path / folder)
@@ -200,3 +201,38 @@ def test_a_configuration_is_sampled_and_exported_in_the_layout_of_the_folder(
     found = compare_real(str(config), real, classes=["cup=apple"], n=4)
     assert (found.ours.layout, len(found.ours.pictures)) == ("coco", 4)
     assert ("apple", "count") in {(row.label, row.quantity) for row in found.rows} or found.few
+
+
+@pytest.mark.parametrize(
+    ("pictures", "text"),
+    [(12, "none of whole pictures; no object was compared"),
+     (5, "nothing was compared: every statistic has fewer than 10 values")],
+)  # fmt: skip
+def test_differences_of_nothing_are_not_none(pictures: int, text: str, tmp_path: Path) -> None:
+    """Both sides list bowls and have none; few pictures give no statistic."""
+    folders = [tmp_path / "real", tmp_path / "ours"]
+    for folder, name in zip(folders, ("cup", "fork"), strict=True):
+        path = write_coco(folder, 5, pictures=pictures, names=(name,))
+        path /= "annotations/instances_all.json"
+        content = json.loads(path.read_text())
+        content["categories"].append({"id": 9, "name": "bowl"})
+        path.write_text(json.dumps(content))
+    found = compare_real(str(folders[1]), folders[0])
+    (table,) = (table for table in make_tables(found) if table.title == "Differences")
+    assert [row[0] for row in table.rows] == [text]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--classes", "a=b"], ["--pictures", "9"], ["--n", "60"],
+     ["--scenes", "9", "--compare-real", "real"]],
+)  # fmt: skip
+def test_options_without_an_effect_are_refused(real: Path, arguments: list[str]) -> None:
+    place = "with" if "--scenes" in arguments else "without"
+    text = f"{arguments[0]}: has no effect {place} --compare-real; leave it out"
+    assert str(error_of(real, *arguments)) == text
+
+
+def test_a_page_that_cannot_be_written_is_refused_before_samples_are_made(real: Path) -> None:
+    error = error_of("tabletop.yaml", "--compare-real", real, "--html", real)
+    assert str(error) == f"{real}: Is a directory; choose another --html"

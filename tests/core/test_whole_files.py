@@ -1,6 +1,7 @@
 """Files are written as a whole, also on a full disk."""
 
 import errno
+import os
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from gen_data.cli import report_command
 from gen_data.core.errors import StorageError
-from gen_data.core.whole_files import whole_file, write_whole
+from gen_data.core.whole_files import check_place, whole_file, write_whole
 from gen_data.preview.contact_sheet import write_sheet
 
 
@@ -67,3 +68,23 @@ def test_a_full_disk_leaves_no_half_of_a_report_or_contact_sheet(
     with pytest.raises(StorageError, match="No space left"):
         report_command._write(tmp_path / "report.html", [])
     assert not list(tmp_path.iterdir())
+
+
+def test_places_of_files_are_checked_before_long_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is made there; folders that are missing are none of the faults."""
+    (tmp_path / "file").write_text("")
+    check_place(tmp_path / "new/folder/page.html", "--html")
+    check_place(tmp_path / "file", "--html")
+    monkeypatch.setattr(os, "access", lambda path, _: path != tmp_path / "closed")
+    (tmp_path / "closed").mkdir()
+    for name, fact in (
+        (".", f"{tmp_path}: Is a directory"),
+        ("file/a/page.html", f"{tmp_path / 'file'}: Not a directory"),
+        ("closed/page.html", f"{tmp_path / 'closed'}: Permission denied"),
+    ):
+        with pytest.raises(StorageError) as caught:
+            check_place(tmp_path / name, "--html")
+        assert str(caught.value) == f"{fact}; choose another --html"
+    assert not (tmp_path / "new").exists()

@@ -189,3 +189,15 @@ def test_boxes_of_coco_and_kitti_are_the_same(tmp_path: Path) -> None:
     )
     assert one == two
     assert one.boxes == (("Car", 10.0, 20.0, 31.0, 41.0),)
+
+
+def test_boxes_outside_of_their_images_are_counted_and_not_fitted(tmp_path: Path) -> None:
+    (tmp_path / "label_2").mkdir()
+    inside, outside = "Car 0 0 0 10 20 40 60\n", "Car 0 0 0 96 20 120 60\nCar 0 0 0 1 90 9 99\n"
+    (tmp_path / "label_2/a.txt").write_text(inside + outside)
+    save(tmp_path / "a.png")
+    inventory = real_files.Inventory()
+    files = real_files.find_files(tmp_path)
+    (labels,) = real_files.read_labels(files, {"a.png": (96, 80)}, inventory)
+    assert labels.boxes == (("Car", 10.0, 20.0, 31.0, 41.0),)
+    assert inventory.notes == {"label files": "2 boxes outside of their images left out"}

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gen_data.assemble.config import load_config, parse_config
-from gen_data.core.errors import ConfigError
+from gen_data.core.errors import ConfigError, StorageError
 from gen_data.lab.matching import api, match
 from gen_data.lab.matching.matched_yaml import format_config
 from gen_data.lab.matching.quantities import CAMERA, base
@@ -78,3 +78,28 @@ def test_a_fit_in_another_folder_extends_the_file(
     api.match("real", source, tmp_path / "new" / "matched.yaml")
     assert "\nextends: ../mine.yaml\n" in (tmp_path / "new/matched.yaml").read_text()
     assert load_config(str(tmp_path / "new/matched.yaml")).general == load_config(source).general
+
+
+@pytest.mark.parametrize("ending", [".yaml", ".json", ".html"])
+def test_a_file_that_exists_is_replaced_on_request_only(
+    ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of the three files may be another one of the user; it is refused before the fit."""
+    monkeypatch.setattr(match, "match_recordings", lambda *_, **__: fitted("closeup.yaml"))
+    own = (tmp_path / "matched.yaml").with_suffix(ending)
+    own.write_text("my own")
+    with pytest.raises(
+        StorageError, match=rf"{ending}: exists; choose another --out, or .*--force"
+    ):
+        api.match("real", "closeup.yaml", tmp_path / "matched.yaml")
+    assert ([*tmp_path.iterdir()], own.read_text()) == ([own], "my own")
+    api.match("real", "closeup.yaml", tmp_path / "matched.yaml", force=True)
+    assert len([*tmp_path.iterdir()]) == 3
+    assert own.read_text() != "my own"
+
+
+def test_an_unwritable_place_is_refused_before_the_fit(tmp_path: Path) -> None:
+    """The folder of recordings, which does not exist, is not looked at."""
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError, match=r"file: Not a directory; choose another --out"):
+        api.match("real", "closeup.yaml", tmp_path / "file/matched.yaml")

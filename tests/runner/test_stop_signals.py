@@ -8,6 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from gen_data.api import generate as generate_module
+from gen_data.cli.main import cli
+from gen_data.core.errors import Interrupted
+from gen_data.runner import run as run_module
+from gen_data.runner.termination_signals import Interruption
+from tests.carry_over.labelled import write_coco
+from tests.runner.doubles import FakeFactory, fake_plan, write_raw_images
 from tests.runner.test_processes import HANG_S, ROOT, wait_for
 
 START = """
@@ -122,3 +129,43 @@ def test_the_second_ctrl_c_is_immediate(tmp_path: Path) -> None:
     message = process.communicate(timeout=HANG_S)[1]
     assert process.returncode == 130
     assert message.strip() == "gen-data: interrupted twice, stopped at once"
+
+
+@pytest.mark.parametrize(
+    ("command", "text"), [("again", "kept; resume with:\n    again"), ("", "nothing is kept")]
+)
+def test_an_interrupted_run_names_a_command_only_where_shards_stay(
+    command: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Temporary folders go, with all finished shards in them."""
+    messages: list[str] = []
+
+    def interruption(message: str) -> Interruption:
+        messages.append(message)
+        return Interruption(message)
+
+    monkeypatch.setattr(run_module, "Interruption", interruption)
+    settings = run_module.Settings(resume_command=command, write_media=write_raw_images)
+    run_module.run(fake_plan(2), FakeFactory(2), tmp_path / "set", settings)
+    assert [message.endswith(text) for message in messages] == [True]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["plan", "tabletop.yaml", "--n", "10", "--probe", "2"],
+     ["report", "tabletop.yaml", "--compare-real", "REAL"]],
+)  # fmt: skip
+def test_samples_of_temporary_folders_cannot_be_resumed(
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their commands named "the same call of gen_data.generate" after Ctrl-C."""
+    write_coco(tmp_path / "real", 1, pictures=2)
+
+    def interrupted(*_: object, resume_command: str = "default", **__: object) -> None:
+        raise Interrupted(resume_command)
+
+    monkeypatch.setattr(generate_module, "generate", interrupted)
+    words = [str(tmp_path / "real") if word == "REAL" else word for word in arguments]
+    with pytest.raises(Interrupted) as caught:
+        cli.main(words, standalone_mode=False)
+    assert str(caught.value) == ""

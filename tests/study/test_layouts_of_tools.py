@@ -81,7 +81,9 @@ def test_an_image_name_of_several_files_is_counted_and_not_guessed(tmp_path: Pat
     coco(tmp_path / "labels.json", {"bbox": [1, 1, 5, 5]})
     for folder in ("first", "second"):
         write_picture(tmp_path / folder / "1.png")
-    with pytest.raises(StorageError, match=r"\(1 x image whose name several files have\)"):
+    with pytest.raises(
+        StorageError, match=r": 1 x image whose name several files have \(such as 1\.png\);"
+    ):
         read_real(tmp_path)
     coco(tmp_path / "labels.json", {"bbox": [1, 1, 5, 5]}, name="second/1.png")
     assert found(tmp_path) == {"second/1.png": 1}
@@ -186,7 +188,25 @@ def test_yolos_labels_of_a_split_without_their_images_are_counted(tmp_path: Path
     write(tmp_path / "labels/train/1.txt", BOX)
     write(tmp_path / "labels/train/2.txt", BOX)
     write_picture(tmp_path / "images/train/1.png")
-    assert read_real(tmp_path).skipped == {"image that is missing": 1}
+    assert read_real(tmp_path).skipped == {"image that is missing (such as 2.png)": 1}
+
+
+def test_missing_splits_of_yolo_are_named_with_the_nearest_folder(tmp_path: Path) -> None:
+    """A misspelt name left its pictures out, or brought in all others, without a word."""
+    text = "train: images/trian\nval: {}\nnames: [cup]\n"
+    for split in ("train", "val"):
+        write(tmp_path / f"labels/{split}/1.txt", BOX)
+        write_picture(tmp_path / f"images/{split}/1.png")
+    fact = "train of data.yaml: 'images/trian', which is missing (did you mean 'images/train'?)"
+    write(tmp_path / "data.yaml", text.format("images/val"))
+    assert read_real(tmp_path).skipped == {fact: 1}
+    assert found(tmp_path) == {"images/val/1.png": 1}
+    write(tmp_path / "data.yaml", text.format("/gone"))
+    assert read_real(tmp_path).skipped == {
+        f"{fact}; all images below are read": 1,
+        "val of data.yaml: '/gone', which is missing; all images below are read": 1,
+    }
+    assert found(tmp_path) == {"images/train/1.png": 1, "images/val/1.png": 1}
 
 
 def test_images_of_linked_folders_are_read_once(tmp_path: Path) -> None:

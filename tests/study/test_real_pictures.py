@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -90,7 +91,7 @@ def test_yolos_boxes_and_polygons_are_read_in_pixels(tmp_path: Path) -> None:
     assert (real.layout, real.category_ids) == ("yolo", {"cup": 1, "plate": 2})
     assert real.skipped == {
         "image without a label file, read as one without objects": 1,
-        "image that is missing": 1,
+        "image that is missing (such as 9.png)": 1,
     }
 
 
@@ -143,8 +144,21 @@ CUPS = {"classes.txt": "cup\nplate\n", "a.png": ""}
          r"a\.txt:2: not a label in YOLO's format: class 2, expected 0 to 1"),
         ({**CUPS, "a.txt": "0 0.5 0.5 0.1 0.1\n0 0.5 0.5 0.1\n"},
          r"a\.txt:2: not a label in YOLO's format: 4 columns"),
+        ({**CUPS, "a.txt": "0 100 100 20 20\n"},
+         r"a\.txt:1: .*: its box reaches to 110; expected shares .*: divide pixels by them"),
+        ({**CUPS, "a.txt": "0 0.5 x 0.1 0.1\n"}, r"a\.txt:1: .*: column 3 is \"x\"; expected"),
         ({"image_2/1.png": "", "label_2/1.txt": "Car 0 0 0 1 2 3 4\nCar 0 0 0 1 2\n"},
-         r"1\.txt:2: not a label in KITTI's format"),
+         r"1\.txt:2: not a label in KITTI's format: 6 columns; expected 15, or 8 without a"),
+        ({"image_2/1.png": "", "label_2/1.txt": "Car 0 inf 0 1 2 3 4\n"},
+         r"1\.txt:1: not a label in KITTI's format: occluded is \"inf\"; expected a number"),
+        ({"image_2/1.png": "", "label_2/1.txt": "Car 0 0 0 1 2 3 4 1 a 1\n"},
+         r"1\.txt:1: not a label in KITTI's format: width is \"a\"; expected a number"),
+        ({"data.yaml": "train: images\nnc: 1\n", "a.png": ""},
+         r"data\.yaml: no file of YOLO's classes: there are no 'names'; expected a list, .*cup, "),
+        ({"data.yaml": "names: cup\n", "a.png": ""}, r"data\.yaml: .*: names is cup; expected"),
+        ({"data.yaml": "names: {1: cup}\n"}, r"data\.yaml: .*: names is \{1: 'cup'\}; expected"),
+        ({"data.yaml": "train: images\nnames: [cup\n", "a.png": ""},
+         r"data\.yaml: no file of YOLO's classes: line 3: "),
         *(({"Annotations/7.xml": text}, r"7\.xml: not annotations in VOC's format")
           for text in ("<annotation>", "<annotation><object/></annotation>")),
         *(({"annotations/x.json": text}, r"x\.json: not annotations in COCO's format")
@@ -161,6 +175,65 @@ def test_a_wrong_label_is_named_by_line(files: dict[str, str], fact: str, tmp_pa
             (tmp_path / name).write_text(text)
     with pytest.raises(StorageError, match=fact):
         read_real(tmp_path)
+
+
+ROW = {"id": 5, "image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "fact"),
+    [
+        ({"annotations": [ROW, {**ROW, "id": 6, "category_id": 77}]},
+         "annotations[1] (id 6): category_id is 77; expected the id of a category"),
+        ({"annotations": [{**ROW, "image_id": [1]}]},
+         "annotations[0] (id 5): image_id is [1]; expected the id of an image"),
+        ({"annotations": [{**ROW, "bbox": [1, 2, 3]}]},
+         "annotations[0] (id 5): bbox is [1, 2, 3]; expected four numbers: x, y, width, height"),
+        ({"annotations": [{**ROW, "bbox": [1, 2, 3, "wide"]}]},
+         'annotations[0] (id 5): bbox is [1, 2, 3, "wide"]; expected four numbers: x, y, width, h'),
+        ({"annotations": [{"image_id": 1, "category_id": 1}]},
+         "annotations[0]: there is no 'bbox'; expected four numbers"),
+        ({"annotations": [7]}, "annotations[0] is 7; expected fields in {}"),
+        ({"annotations": {}}, "there is no list 'annotations'"),
+        ({"categories": [{"name": "cup"}]}, "categories[0]: there is no 'id'; expected a number"),
+        ({"images": [{"id": 1, "file_name": "0.png", "width": "wide"}]},
+         'images[0] (id 1): width is "wide"; expected a number of pixels'),
+    ],
+)  # fmt: skip
+def test_a_fault_of_cocos_file_is_named_by_row_field_and_value(
+    changes: dict[str, Any], fact: str, tmp_path: Path
+) -> None:
+    content = {"images": [{"id": 1, "file_name": "0.png"}], "annotations": [ROW],
+               "categories": [{"id": 1, "name": "cup"}], **changes}  # fmt: skip
+    write_picture(tmp_path / "0.png")
+    path = tmp_path / "annotations/a.json"
+    path.parent.mkdir()
+    path.write_text(json.dumps(content))
+    with pytest.raises(StorageError) as caught:
+        read_real(tmp_path)
+    assert str(caught.value).startswith(f"{path}: not annotations in COCO's format: {fact}")
+
+
+@pytest.mark.parametrize("size", [{}, {"width": 64}, {"width": None, "height": 48}, {"height": 0}])
+def test_cocos_images_need_not_state_their_size(size: dict[str, Any], tmp_path: Path) -> None:
+    write_coco(tmp_path, [[]], images=[{"id": 10, "file_name": "0.png", **size}])
+    real = read_real(tmp_path)
+    assert ([p.size_px for p in real.pictures], real.skipped) == ([(64, 48)], {})
+
+
+def test_boxes_outside_of_their_image_are_counted_and_left_out(tmp_path: Path) -> None:
+    """Beyond each side of 64 x 48 px; one that reaches into the image stays as it is."""
+    outside = [[64, 5, 9, 9], [5, 48, 9, 9], [-9, 5, 9, 9], [5, -9, 9, 9], [1000, 1000, 50, 50]]
+    write_coco(tmp_path / "coco", [[{"bbox": box} for box in [*outside, [60, 40, 9, 9]]]])
+    real = read_real(tmp_path / "coco")
+    assert [thing.box for thing in real.pictures[0].objects] == [(60, 40, 69, 49)]
+    assert real.skipped == {"object outside of its image": 5}
+    write_picture(tmp_path / "yolo/a.png")
+    (tmp_path / "yolo/classes.txt").write_text("cup\n")
+    (tmp_path / "yolo/a.txt").write_text("0 1.5 0.5 0.2 0.2\n0 1 0.5 0.5 0.5\n")
+    real = read_real(tmp_path / "yolo")
+    assert [thing.box for thing in real.pictures[0].objects] == [(48, 12, 80, 36)]
+    assert real.skipped == {"object outside of its image": 1}
 
 
 VOC = """\
@@ -198,17 +271,17 @@ def test_what_cannot_be_used_is_counted_and_the_rest_chosen_evenly(tmp_path: Pat
     whole, some = read_real(tmp_path), read_real(tmp_path, None, most=2)
     assert [p.image_id for p in whole.pictures] == [10, 13, 14, 16]
     assert whole.skipped == {
-        "image that is missing": 1,
-        "image that cannot be read": 1,
+        "image that is missing (such as 1.png)": 1,
+        "image that cannot be read (such as 2.png)": 1,
         "object with an empty box": 1,
-        "image of another size than its labels state": 1,
+        "image of another size than its labels state (such as 5.png)": 1,
     }
     assert [p.image_id for p in some.pictures] == [10, 13]
     assert some.skipped == {"picture beyond the largest number": 5, "object with an empty box": 1}
     for k in range(7):
         (tmp_path / f"images/{k}.png").unlink(missing_ok=True)
     with pytest.raises(
-        StorageError, match=r"no picture can be used .*, 7 x image that is missing\)"
+        StorageError, match=r"can be used: .*, 7 x image that is missing \(such as 0\.png\);"
     ):
         read_real(tmp_path)
 
@@ -217,7 +290,7 @@ def test_one_picture_and_pictures_without_objects_cannot_judge(tmp_path: Path) -
     """The reasons for which others were left out are listed."""
     write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}], []])
     (tmp_path / "images/1.png").unlink()
-    with pytest.raises(ConfigError, match=r"1 picture can be .* \(skipped: 1 x image that is miss"):
+    with pytest.raises(ConfigError, match=r"1 picture can be .*; skipped: 1 x image that is miss"):
         check_judges(read_real(tmp_path))
     write_coco(tmp_path, [[], [{"bbox": [5, 5, 4, 4], "iscrowd": 1}]])
     with pytest.raises(ConfigError, match="has no labelled object"):
