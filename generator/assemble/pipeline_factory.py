@@ -456,7 +456,7 @@ def _check_label_map(config: Config, categories: Sequence[str]) -> None:
 def warn_of_subcategories(config: Config, categories: Sequence[str], library: Library) -> None:
     """Warn with a ConfigWarning of subcategories in the label map that no object has.
 
-    It is no error: plug-ins may give subcategories to objects.
+    Not an error: plug-ins may give subcategories to objects.
     """
     finer = [source for source in config.general.labels.map.named if "/" in source]
     known = frozenset[str]().union(*(a.words for a in library.find(()))) if finer else frozenset()

@@ -99,7 +99,7 @@ class Node:
         content: A scalar, a tuple of nodes (a list), or a dictionary of nodes (a mapping).
         key_positions: Positions of a mapping's keys.
         text: The scalar as written, without quotes.
-        replaced: Of a shared value: the inherited declarations that it replaces.
+        replaced: Inherited declarations that a shared value replaces.
     """
 
     position: Position
