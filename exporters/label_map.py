@@ -133,6 +133,12 @@ class LabelMap(Strict):
         listed = public_classes(self.classes) if isinstance(self.classes, str) else self.classes
         return {name: (name,) if own is None else own for name, own in listed.items()}
 
+    @property
+    def named(self) -> Sources:
+        """All categories and subcategories that the user names."""
+        classes = self.classes_of if isinstance(self.classes, Mapping) else {}
+        return (*(c for own in classes.values() for c in own), *self.ignore, *self.drop)
+
     def check(self, categories: Sequence[str]) -> None:
         """Compare the map with the categories of a data set.
 
@@ -148,9 +154,7 @@ class LabelMap(Strict):
         if faults:
             texts = (f"labels.map.classes.{name}: {fact}" for name, fact in faults.items())
             raise ConfigError("\n".join(texts))
-        named = self.classes_of if isinstance(self.classes, Mapping) else {}
-        listed = (c for own in named.values() for c in own)
-        for category in (*listed, *self.ignore, *self.drop):
+        for category in self.named:
             if category_of(category) not in categories:
                 text = f"labels.map: the data set has no category '{category}'"
                 warnings.warn(
