@@ -80,7 +80,9 @@ def test_origins_of_points_are_stored_and_linked(tmp_path: Path) -> None:
 
 def test_a_label_map_makes_a_data_set_of_the_users_classes(dataset: Path, tmp_path: Path) -> None:
     """With the ids of their order, also in exports of the export, and in Python."""
-    (tmp_path / "map.yaml").write_text("classes: {kitchen: [mug, bowl, cup, plate, bottle], arm: robot_arm}\n")
+    (tmp_path / "map.yaml").write_text(
+        "classes: {kitchen: [mug, bowl, cup, plate, bottle], arm: robot_arm}\n"
+    )
     done = gen_data(
         "export", str(dataset), "-f", "{type: coco, amodal: false}",
         "--label-map", "map.yaml", "-o", "out", cwd=tmp_path,

@@ -1,9 +1,9 @@
 """``gen_data.open`` of a recipe: samples are rendered when they are read, and then kept."""
 
 import importlib.util
-import sys
 import os
 import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
