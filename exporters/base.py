@@ -1,6 +1,6 @@
 """Base class of exporters, with defaults for the optional members of ``Exporter``."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import ClassVar, TypeVar, get_args
@@ -178,6 +178,29 @@ def check_classes(exporter: str, info: interfaces.DatasetInfo, known: Collection
             f"exporter '{exporter}': no category of the data set has a class in this format; "
             f"expected at least one of: {', '.join(known)}. Use coco for other categories"
         )
+
+
+def check_distinct(
+    exporter: str, info: interfaces.DatasetInfo, written: Callable[[str], str]
+) -> None:
+    """Reject categories that a format writes alike, whose objects readers would mix up.
+
+    Args:
+        exporter: Its name.
+        info: Facts about the data set.
+        written: The form of a category in the files.
+
+    Raises:
+        ConfigError: the text names two of them.
+    """
+    seen: dict[str, str] = {}
+    for category in info.categories:
+        other = seen.setdefault(written(category), category)
+        if other != category:
+            raise errors.ConfigError(
+                f"exporter '{exporter}': the categories '{other}' and '{category}' are both "
+                f"'{written(category)}' in its files; rename one, or merge them by a label map"
+            )
 
 
 def _plain(category: str) -> str:

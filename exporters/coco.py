@@ -129,6 +129,9 @@ class Coco(base.ExporterBase):
     shorter and which some trainers do not read, or none."""
     bbox: Literal["visible", "amodal"] = "visible"
     """Boxes around the visible pixels, or around the whole silhouette within the image."""
+    keypoints: Literal["places", "pixels"] = "places"
+    """Keypoints in the image coordinates of boxes, or as numbers of pixels, 0.5 less, for which
+    Detectron2, MMPose and Albumentations take them."""
     amodal: bool = True
     """Also write the box of the silhouette and, with the annotation amodal_masks, its mask."""
 
@@ -186,7 +189,10 @@ class Coco(base.ExporterBase):
                 path = folder / f"{'_'.join(name.split())}_keypoints_{split}.json"
                 category = _keypoint_category(category_id, name, skeleton)
                 header = dataset_header(info, [category], self.conventions)
-                write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
+                if self.keypoints == "pixels":
+                    header["info"]["keypoints"] = "numbers of pixels: 0.5 less than places in boxes"
+                shift_px = 0.5 if self.keypoints == "pixels" else 0.0
+                write_dataset(path, header, images(), _keypoint_rows(lines, skeleton, shift_px))
             for shard_dir, image in fragment_rows(shard_dirs, self.type, f"{split}.images"):
                 _link_images(info, image, split, shard_dir, dataset_dir)
 
@@ -384,16 +390,26 @@ def _skeletons(fragments: Sequence[Path]) -> dict[int, Skeleton]:
     return {number: find_skeleton(names[number]) for number in sorted(names) if names[number]}
 
 
-def _keypoint_rows(lines: Iterable[str], skeleton: Skeleton) -> Iterator[str]:
-    """Complete annotations to the whole skeleton; absent points are COCO's (0, 0, 0)."""
+def _keypoint_rows(lines: Iterable[str], skeleton: Skeleton, shift_px: float) -> Iterator[str]:
+    """Complete annotations to the whole skeleton; absent points are COCO's (0, 0, 0).
+
+    ``shift_px`` is subtracted from the coordinates of all others.
+    """
     for line in lines:
         row = json.loads(line)
-        points = {name: (u, v, seen, place) for name, u, v, seen, place in row.pop("points")}
+        points = {
+            name: (*_shifted((u, v), shift_px if seen else 0.0), seen, place)
+            for name, u, v, seen, place in row.pop("points")
+        }
         found = [points.get(name, (0, 0, 0, None)) for name in skeleton.names]
         row["keypoints"] = [value for u, v, seen, _ in found for value in (u, v, seen)]
         row["num_keypoints"] = sum(seen > 0 for _, _, seen, _ in found)
         row["keypoints_camera_m"] = {name: place for name, (*_, place) in points.items()}
         yield serialization.canonical_json(row)
+
+
+def _shifted(place_px: Sequence[float], shift_px: float) -> Iterator[float]:
+    return (round(value - shift_px, 3) if shift_px else value for value in place_px)
 
 
 def _categories(info: DatasetInfo) -> list[dict[str, Any]]:

@@ -24,7 +24,7 @@ from pydantic import Field
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
-from gen_data.exporters import coco, fragments, image_files, image_rows, sequences
+from gen_data.exporters import base, coco, fragments, image_files, image_rows, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 
 HEADER = ("imagesource:gen-data", "gsd:null")
@@ -52,6 +52,15 @@ class Dota(image_rows.ImageRowsExporter):
             {"oriented_boxes2d", "visibility"} if self.difficult_below else {"oriented_boxes2d"}
         )
 
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent.
+
+        Raises:
+            ConfigError: no sensor writes the rgb channel, or two categories are written alike.
+        """
+        super().check(info)
+        base.check_distinct(self.type, info, _hyphenated)
+
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         """The lines of its label file."""
         suffix = info.encoding(sensor, Channel.RGB).suffix
@@ -74,7 +83,11 @@ class Dota(image_rows.ImageRowsExporter):
     def _line(self, thing: ObjectTruth) -> str:
         assert thing.oriented_box is not None, "filtered by the caller"
         corners = " ".join(f"{u:.1f} {v:.1f}" for u, v in thing.oriented_box)
-        category = "-".join(thing.instance.category.split())
+        category = _hyphenated(thing.instance.category)
         share = thing.visible_fraction
         difficult = share is not None and share < self.difficult_below
         return f"{corners} {category} {int(difficult)}"
+
+
+def _hyphenated(category: str) -> str:
+    return "-".join(category.split())

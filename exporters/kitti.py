@@ -133,6 +133,11 @@ class KittiLabels(base.ExporterBase):
         """Whether the types are KITTI's."""
         return self.types == "official"
 
+    def check_types(self, info: DatasetInfo, exporter: str) -> None:
+        """Reject categories that would be one type. Raises ConfigError."""
+        if self.types == "category":
+            base.check_distinct(exporter, info, _join_words)
+
     def labelled_m(self, kind: str) -> float:
         """Depth up to which objects of one of KITTI's types have labels."""
         people_m = self.far_people_m if kind in PEOPLE else None
@@ -160,10 +165,11 @@ class Kitti(KittiLabels):
 
         Raises:
             ConfigError: no such camera or lidar, the camera is not a pinhole or does not write the
-                rgb channel, or too many samples for six digits.
+                rgb channel, two categories are written alike, or too many samples for six digits.
         """
         self._camera(info)
         self._lidar(info)
+        self.check_types(info, self.type)
         check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

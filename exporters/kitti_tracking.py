@@ -74,11 +74,12 @@ class KittiTracking(kitti.KittiLabels):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: a sensor is not there, a camera is not a pinhole, or there are too many
-                sequences.
+            ConfigError: a sensor is not there, a camera is not a pinhole, two categories are
+                written alike, or there are too many sequences.
         """
         check_calibrations(info, self._cameras(info).values(), self.type)
         laser_scanner(info, self.lidar, self.type)
+        self.check_types(info, self.type)
         sequences.check_sequence_count(info, SEQUENCES_MAX, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

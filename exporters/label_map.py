@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import yaml
 from pydantic import Field, field_validator, model_validator
@@ -27,6 +27,7 @@ from gen_data.exporters.base import WrappedExporter
 PublicList = Literal["coco80", "kitti", "nuscenes", "cityscapes", "nyu40", "ade20k"]
 Sources = tuple[str, ...]
 """Categories of the data set, or ``category/subcategory``."""
+Classes = Mapping[str, Sources | None]
 
 
 class LabelMap(Strict):
@@ -37,10 +38,10 @@ class LabelMap(Strict):
 
     Attributes:
         classes: ``{class: categories}``, in the order of class ids; a class without categories
-            takes the category of its name. Or the name of a public list: ``coco80``,
-            ``kitti``, ``nuscenes``, ``cityscapes``, ``nyu40``, ``ade20k``. Without it, all
-            categories keep their names. ``category/subcategory`` stands for these objects only,
-            and goes before their category, here and below.
+            takes the category of its name. Plans have a list of such with one class each. Or the
+            name of a public list: ``coco80``, ``kitti``, ``nuscenes``, ``cityscapes``, ``nyu40``,
+            ``ade20k``. Without it, all categories keep their names. ``category/subcategory`` stands
+            for these objects only, and goes before their category, here and below.
         others: Objects of all other categories: left out, or kept as ignored regions (in formats
             that have such regions without a class, such as KITTI's DontCare).
         ignore: Categories whose objects become ignored regions.
@@ -53,7 +54,7 @@ class LabelMap(Strict):
         below: Objects that miss one of these limits: left out, or kept as ignored regions.
     """
 
-    classes: PublicList | Mapping[str, Sources | None] | None = None
+    classes: PublicList | Classes | None = None
     others: Literal["drop", "ignore"] = "drop"
     ignore: tuple[str, ...] = ()
     drop: tuple[str, ...] = ()
@@ -63,10 +64,24 @@ class LabelMap(Strict):
     min_detectability: float = Field(0.0, ge=0.0)
     below: Literal["drop", "ignore"] = "drop"
 
-    @field_validator("classes", mode="before")
+    @field_validator(
+        "classes",
+        mode="before",
+        json_schema_input_type=PublicList | Classes | tuple[Classes, ...] | None,
+    )
     @classmethod
     def _listed(cls, classes: object) -> object:
-        """A single category needs no list. Tuples, as strict validation takes no lists here."""
+        """A single category needs no list. Tuples, as strict validation takes no lists here.
+
+        A list of ``{class: categories}``, as in plans, keeps its order in files that sort keys.
+        """
+        if isinstance(classes, (list, tuple)):
+            if not all(isinstance(one, Mapping) and len(one) == 1 for one in classes):
+                raise ValueError("expected {class: categories}, or a list of such with one class")
+            names = [name for one in classes for name in one]
+            if len({*names}) < len(names):
+                raise ValueError("a class is listed twice")
+            classes = {name: own for one in classes for name, own in one.items()}
         if not isinstance(classes, Mapping):
             return classes
         return {
@@ -118,6 +133,12 @@ class LabelMap(Strict):
         listed = public_classes(self.classes) if isinstance(self.classes, str) else self.classes
         return {name: (name,) if own is None else own for name, own in listed.items()}
 
+    @property
+    def named(self) -> Sources:
+        """All categories and subcategories that the user names."""
+        classes = self.classes_of if isinstance(self.classes, Mapping) else {}
+        return (*(c for own in classes.values() for c in own), *self.ignore, *self.drop)
+
     def check(self, categories: Sequence[str]) -> None:
         """Compare the map with the categories of a data set.
 
@@ -133,9 +154,7 @@ class LabelMap(Strict):
         if faults:
             texts = (f"labels.map.classes.{name}: {fact}" for name, fact in faults.items())
             raise ConfigError("\n".join(texts))
-        named = self.classes_of if isinstance(self.classes, Mapping) else {}
-        listed = (c for own in named.values() for c in own)
-        for category in (*listed, *self.ignore, *self.drop):
+        for category in self.named:
             if category_of(category) not in categories:
                 text = f"labels.map: the data set has no category '{category}'"
                 warnings.warn(
@@ -164,6 +183,16 @@ class LabelMap(Strict):
                     f"{list_names(categories, 40)}; or [] for a class without objects"
                 )
         return found
+
+
+def in_order(config: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A configuration whose classes are a list, the order of which is part of its JSON."""
+    labels = config.get("labels") or {}
+    classes = (labels.get("map") or {}).get("classes")
+    if not isinstance(classes, Mapping):
+        return config
+    listed = [{name: own} for name, own in classes.items()]
+    return {**config, "labels": {**labels, "map": {**labels["map"], "classes": listed}}}
 
 
 def category_of(source: str) -> str:

@@ -84,9 +84,17 @@ class Voc(base.ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no sensor writes the rgb channel, or there are too many categories.
+            ConfigError: no sensor writes the rgb channel, there are too many categories, two have
+                one name of files, or ``labelmap.txt`` cannot hold one.
         """
         check_channels(info, (), self.type)
+        for category in info.categories:
+            if ":" in category or category.startswith("#"):
+                raise ConfigError(
+                    f"exporter '{self.type}': category '{category}': labelmap.txt has ':' between "
+                    "columns and '#' before comments; rename it by a label map"
+                )
+        base.check_distinct(self.type, info, _file_word)
         if len(info.categories) > LABELS_MAX:
             raise ConfigError(
                 f"exporter '{self.type}': label images have room for {LABELS_MAX} categories, but "

@@ -214,11 +214,9 @@ def _visible(reading: CameraReading, ignored: bool) -> list[ObjectTruth]:
 
 
 def _boxes(sample: Sample, reading: CameraReading, objects: Sequence[ObjectTruth]) -> Arrays:
-    boxes = [b.xyxy for b in reading.boxes2d]
-    numbers = [b.instance_id for b in reading.boxes2d]
-    chosen = [numbers.index(thing.instance.instance_id) for thing in objects]
+    boxes = [(b.x_min, b.y_min, b.x_max, b.y_max) for t in objects if (b := t.box) is not None]
     return {
-        "boxes": np.array(boxes, np.float32).reshape(-1, 4)[chosen],
+        "boxes": np.array(boxes, np.float32).reshape(-1, 4),
         "labels": np.array([t.instance.category_id for t in objects], np.int64),
         "area": np.array([t.visible_px for t in objects], np.float32),
         "iscrowd": np.array([t.ignored for t in objects], np.int64),

@@ -13,14 +13,23 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch.utils.data import Dataset, IterableDataset
+from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
 from gen_data.api.dataset import SampleSequence
 from gen_data.api.loader import Loader
 from gen_data.api.sample import Sample
+from gen_data.core.errors import ConfigError
 from gen_data.targets import detection_target
 
-__all__ = ["SampleDataset", "SampleStream", "collate", "loader", "to_tensors", "to_tv_tensors"]
+__all__ = [
+    "SampleDataset",
+    "SampleStream",
+    "collate",
+    "loader",
+    "object_rows",
+    "to_tensors",
+    "to_tv_tensors",
+]
 
 Target = Callable[[Sample], Any]
 
@@ -67,7 +76,17 @@ class SampleStream(IterableDataset[Any]):
         self.source = source
 
     def __iter__(self) -> Iterator[Any]:
-        """Batches of one epoch."""
+        """Batches of one epoch.
+
+        Raises:
+            ConfigError: workers of a ``DataLoader`` iterate: each would yield the whole epoch, the
+                same one every time.
+        """
+        if get_worker_info() is not None:
+            raise ConfigError(
+                "num_workers: a SampleStream has its own workers; expected 0, and `workers` of the "
+                "Loader instead"
+            )
         for batch in self.source:
             yield collate([to_tensors(item) for item in batch])
 
@@ -142,3 +161,17 @@ def to_tv_tensors(pair: tuple[torch.Tensor, dict[str, torch.Tensor]]) -> tuple[A
         wrapped["keypoints"] = tv_tensors.KeyPoints(points[..., :2], canvas_size=canvas_size)
         wrapped["keypoint_visibility"] = points[..., 2]
     return tv_tensors.Image(image), wrapped
+
+
+def object_rows(pair: tuple[Any, Mapping[str, Any]]) -> tuple[torch.Tensor, ...]:
+    """Tensors with a row per object, besides boxes and masks.
+
+    torchvision's ``SanitizeBoundingBoxes(labels_getter=object_rows)`` removes rows of all of them
+    with a box. By default it keeps the rows of keypoints (0.28), which then belong to other boxes.
+
+    Args:
+        pair: An image and its target, also of ``to_tv_tensors``.
+    """
+    _, target = pair
+    names = ("labels", "area", "iscrowd", "keypoints", "keypoint_visibility")
+    return tuple(target[name] for name in names if name in target)

@@ -11,6 +11,7 @@ from gen_data.assets.asset_ids import AssetId, parse_asset_id
 from gen_data.assets.families import declared
 from gen_data.config import distributions as dist
 from gen_data.core.asset_types import Float32
+from gen_data.core.asset_words import check_categories
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members
 from gen_data.core.scene import Scene, SupportSurface
@@ -74,6 +75,11 @@ class ReachingHand(asset_groups.GroupRandomizer):
     reach_m: dist.NonNegative = dist.Uniform(0.08, 0.3)
     turn_deg: dist.Scalar = dist.Uniform(-30.0, 30.0)
     raised_m: dist.NonNegative = dist.Choice({0.0: 2.0, 0.03: 1.0, 0.08: 1.0})
+
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """See ``RandomizerBase.check``; categories are checked, too."""
+        super().check(scene, assets)
+        check_categories(self.held_categories, assets, f"randomizers.{self.name}.held_categories")
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with a hand, or unchanged if none is drawn or none has room."""

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from gen_data.config import distributions as dist
 from gen_data.core import interfaces, streams
+from gen_data.core.asset_words import check_categories
 from gen_data.core.scene import Scene
 from gen_data.randomizers.base import SurfaceRandomizer, body_materials, choose, find_textures
 
@@ -34,6 +35,11 @@ class Textures(SurfaceRandomizer):
     slots: tuple[int, ...] = ()
     prints: bool = False
     categories: tuple[str, ...] = ()
+
+    def check(self, scene: Scene, assets: interfaces.AssetIndex) -> None:
+        """See ``SurfaceRandomizer.check``; categories are checked, too."""
+        super().check(scene, assets)
+        check_categories(self.categories, assets, f"randomizers.{self.name}.categories")
 
     def possible_textures(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
         """Ids of the textures to draw from."""

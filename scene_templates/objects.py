@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from gen_data.config.base_model import Strict
 from gen_data.core import errors
 from gen_data.core.asset_types import Asset
-from gen_data.core.asset_words import check_words
+from gen_data.core.asset_words import check_tags, check_words
 from gen_data.core.bounded_cache import CountCache, ObjectCache
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members
@@ -63,7 +63,7 @@ class AssetChoice(Strict):
         """Find the ids of all matching assets, sorted.
 
         Raises:
-            ConfigError: no asset matches, or an excluded word is unknown.
+            ConfigError: no asset matches, or a tag or an excluded word is unknown.
             AssetError: an id is unknown.
         """
         known = _resolved.get(assets, lambda: CountCache(_CHOICES))
@@ -79,6 +79,8 @@ class AssetChoice(Strict):
         for asset_id in self.ids:
             members = assets.variants(asset_id) or (assets.get(asset_id),)
             found |= {a.asset_id: a for a in members}
+        for key in ("tags", "any_of", "prefer"):
+            check_tags(getattr(self, key), assets, f"{field}.{key}")
         check_words(self.exclude, found.values(), assets, f"{field}.exclude")
         fitting = [a for a in found.values() if not any(map(a.has_word, self.exclude))]
         return tuple(sorted(asset.asset_id for asset in self._select_preferred(fitting)))

@@ -62,7 +62,11 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     LocalStore(Path(out)).check_unlocked()
 
     from gen_data.assemble.config import load_config
-    from gen_data.assemble.pipeline_factory import check_scene, ready_exporters
+    from gen_data.assemble.pipeline_factory import (
+        check_scene,
+        ready_exporters,
+        warn_of_subcategories,
+    )
     from gen_data.packs.provision import open_assets
     from gen_data.runner.exports import export as write_exports
     from gen_data.runner.run import Settings
@@ -79,7 +83,9 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     with _named_formats():
         config = load_config(source, overrides=overrides, first_scene_only=True)
         _check_annotations(load_config(source, first_scene_only=True), config)
-        exporters = ready_exporters(config, stored.info, open_assets(config.asset_folders))
+        assets = open_assets(config.asset_folders)
+        exporters = ready_exporters(config, stored.info, assets)
+        warn_of_subcategories(config, stored.categories, assets)
         check_scene(config, stored.sample(0).scene)
     summary = write_exports(
         stored,

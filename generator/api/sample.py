@@ -156,11 +156,11 @@ class CameraReading:
 
     @cached_property
     def boxes2d(self) -> tuple[Box2d, ...]:
-        """Boxes of the annotated objects with a visible pixel."""
+        """Boxes of the annotated objects with a visible pixel, without ignored ones."""
         return tuple(
             Box2d(*_identity(item), *_corners(item.box), item.visible_fraction)
-            for item in self._truth.objects
-            if item.instance.annotated and item.box is not None
+            for item in self._counting
+            if item.box is not None
         )
 
     @cached_property
@@ -168,9 +168,14 @@ class CameraReading:
         """Oriented boxes of the annotated objects; empty without the annotation ``boxes3d``."""
         return tuple(
             Box3d(*_identity(item), item.box3d_world, item.box3d_camera)
-            for item in self._truth.objects
-            if item.instance.annotated and item.box3d_world is not None
+            for item in self._counting
+            if item.box3d_world is not None
         )
+
+    @property
+    def _counting(self) -> Iterator[ObjectTruth]:
+        """Annotated objects that no label map ignores."""
+        return (t for t in self._truth.objects if t.instance.annotated and not t.ignored)
 
     @property
     def K(self) -> se3.Array:  # noqa: N802

@@ -32,7 +32,7 @@ from gen_data.config.yaml_tree import Node
 from gen_data.core import bounded_cache, errors, interfaces, scene
 from gen_data.core.plugins import PluginTable
 from gen_data.core.streams import Streams
-from gen_data.exporters.label_map import LabelMap
+from gen_data.exporters.label_map import LabelMap, in_order
 from gen_data.physics import PhysicsConfig
 from gen_data.pipeline.splits import Splits
 
@@ -347,7 +347,7 @@ def config_of(document: Node, name: str, **changes: Unpack[Changes]) -> Config:
     assert head is not None
     assert render is not None
     config = Config(
-        name, document.plain(), head, render, annotations, exporters, probes, document,
+        name, in_order(document.plain()), head, render, annotations, exporters, probes, document,
         changes.get("asset_places", {}),
     )  # fmt: skip
     _ = config.asset_folders  # Missing folders are refused before a run.

@@ -15,6 +15,7 @@ from gen_data.config.merging import merge_named, merge_nodes, node_name, with_en
 from gen_data.config.paths import find_path
 from gen_data.config.problems import Position, Problems, format_path, refuse
 from gen_data.config.renamed_keys import refuse_moved_keys, replace_old_words
+from gen_data.config.shared_checks import check_shared
 from gen_data.config.yaml_scalars import quote_value
 from gen_data.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
 from gen_data.core.errors import ConfigError, did_you_mean
@@ -45,6 +46,8 @@ SECTIONS = ("render", "physics", "labels", "splits", "assets", "dataset", "share
 NOWHERE = Position("(default)", 1, 1)
 """Position of values that are in no file."""
 
+NOTHING = Node(NOWHERE, {})
+
 TEMPLATE_KEYS = ("shared", "defaults", "elements")
 """Keys of a template."""
 
@@ -69,6 +72,7 @@ def resolve_document(
     if seed is not None:
         content["seed"] = Node(NOWHERE, seed)
     resolved = Node(document.position, content, document.key_positions)
+    before = resolved.entries["shared"]
     for text in overrides:
         path, separator, value = text.partition("=")
         if not separator:
@@ -76,6 +80,9 @@ def resolve_document(
         resolved = with_override(resolved, path.strip(), value.strip())
     resolved = replace_old_words(resolved)
     refuse_moved_keys(resolved)
+    shared = _with_replaced(before, resolved.entries["shared"])
+    resolved = replace(resolved, content={**resolved.entries, "shared": shared})
+    check_shared(resolved, (template.get("shared") or NOTHING) if template else before)
     return _without_randomizers(_with_files(resolved), without)
 
 
@@ -174,7 +181,8 @@ def _merge_into_base(base: Node, document: Node) -> Node:
         elif key in (*LISTS, "elements") and key not in OUTPUTS:
             content[key] = _merge_items(inherited, node)
         else:
-            content[key] = merge_nodes(_without_shares(key, inherited, node), node)
+            merged = merge_nodes(_without_shares(key, inherited, node), node)
+            content[key] = _with_replaced(inherited, merged) if key == "shared" else merged
     positions = {**base.key_positions, **document.key_positions}
     return Node(document.position, content, positions)
 
@@ -309,7 +317,20 @@ def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
         return
     entries = {**_mapping_of(inherited), **(_mapping_of(own) if own else {})}
     positions = {**inherited.key_positions, **(own.key_positions if own else {})}
-    content["shared"] = Node((own or inherited).position, entries, positions)
+    merged = Node((own or inherited).position, entries, positions)
+    content["shared"] = _with_replaced(inherited, merged)
+
+
+def _with_replaced(inherited: Node, shared: Node) -> Node:
+    """Shared values, each with the inherited declarations that it replaces."""
+
+    def note(name: str | int, node: Node) -> Node:
+        old = inherited.get(name)
+        if old is None or old is node:
+            return node
+        return replace(node, replaced=(*node.replaced, old, *old.replaced))
+
+    return shared.with_children(note)
 
 
 def _merge_elements(document: Node, template: Node | None) -> Node:

@@ -14,14 +14,14 @@ from gen_data.assemble import plugin_tables, preflight
 from gen_data.assemble.config import Config, SceneConfig
 from gen_data.assets.library import Library
 from gen_data.config.error_positions import located_errors
-from gen_data.config.problems import Problems, refuse
+from gen_data.config.problems import Problem, Problems, refuse
 from gen_data.config.yaml_tree import find_text
 from gen_data.core import interfaces, path_names, plates
 from gen_data.core.capture import Channel
-from gen_data.core.errors import AssetError, ConfigError, ConfigWarning, Refusals
+from gen_data.core.errors import AssetError, ConfigError, ConfigWarning, Refusals, one_of
 from gen_data.core.scene import LABEL_IDS_MAX, Scene, SharedValue
 from gen_data.exporters.base import ExporterBase, check_delivery, check_image_formats
-from gen_data.exporters.label_map import MappedExporter
+from gen_data.exporters.label_map import MappedExporter, category_of
 from gen_data.packs.provision import open_assets
 from gen_data.physics import missing_engine, open_engine
 from gen_data.pipeline import Pipeline, exporter_views, pipeline
@@ -137,6 +137,7 @@ class PipelineFactory:
             with refused.collected(), located_errors(config.document):
                 preflight.check_text(config.probes, self.nominal, self.library, place)
         refused.raise_if_any()
+        warn_of_subcategories(config, self.categories, self.library)
         self._warn_of_doubtful_scenes()
 
     def _warn_of_doubtful_scenes(self) -> None:
@@ -450,6 +451,25 @@ def _check_label_map(config: Config, categories: Sequence[str]) -> None:
         problems.add(classes.key_position(name), ("labels", "map", "classes", name), fact)
     problems.raise_if_any()
     label_map.check(categories)
+
+
+def warn_of_subcategories(config: Config, categories: Sequence[str], library: Library) -> None:
+    """Warn with a ConfigWarning of subcategories in the label map that no object has.
+
+    Not an error: plug-ins may give subcategories to objects.
+    """
+    finer = [source for source in config.general.labels.map.named if "/" in source]
+    known = frozenset[str]().union(*(a.words for a in library.find(()))) if finer else frozenset()
+    for source in finer:
+        category = category_of(source)
+        if category in categories and source not in known:
+            same = sorted(word for word in known if word.startswith(f"{category}/"))
+            expected = one_of(source, same) if same else f"'{category}' has no subcategories"
+            node = config.document.get("labels", "map")
+            found = find_text(node, source, ("labels", "map")) if node else None
+            position, field = found or (config.document.position, "labels.map")
+            text = Problem(position, field, f"no object is '{source}'; {expected}")
+            warnings.warn(str(text), ConfigWarning, stacklevel=3)
 
 
 def ready_exporters(

@@ -272,6 +272,11 @@ class MeshEntry(Origin):
             raise ValueError("a file pattern takes neither id nor count: every file has its own id")
         return self
 
+    @property
+    def is_one_of_several(self) -> bool:
+        """Whether it is of a series or a file pattern, whose ids follow from the files."""
+        return self.count > 1 or self.id == asset_id_from_path(self.file)
+
     def metres_per_unit(self) -> float:
         """Metres per unit of the file, if no size is given."""
         return METRES_PER_UNIT[self.unit] if self.unit else self.scale

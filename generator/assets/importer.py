@@ -7,7 +7,7 @@ Mesh and collision parts always share one frame.
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
@@ -35,7 +35,7 @@ from gen_data.assets.texture_maps import (
 from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
 from gen_data.assets.vertex_colors import IMAGE, resolve_colors
 from gen_data.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
-from gen_data.core.errors import AssetError
+from gen_data.core.errors import AssetError, did_you_mean, one_of
 from gen_data.core.scene import Lane
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.roads import opendrive, opendrive_lanes
@@ -131,8 +131,9 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     decoded |= {} if colored.image is None else {IMAGE: colored.image}
     owner = f"{asset_id}/{piece}" if piece and decoded else asset_id
     soup = _apply_finishes(colored.soup, entry.materials, place, owner)
+    unmatched = _unmatched_materials(entry, soup, is_whole=not piece)
     soup, hidden = _drop_transparent(soup, place)
-    remarks = (*remarks, *_remarks_of(entry.file, (*colored.remarks, *hidden)))
+    remarks = (*remarks, *_remarks_of(entry.file, (*colored.remarks, *hidden, *unmatched)))
     matrix = upright_transform(entry, up)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
@@ -244,8 +245,9 @@ def import_link(
             soup = _palette_colors(folder, soup)
         colored = resolve_colors(soup, entry.max_faces)
         images |= {} if colored.image is None else {IMAGE: colored.image}
-        unused = (*(text for source in sources for text in source.remarks), *colored.remarks)
-        remarks = _remarks_of(entry.file, unused)
+        unmatched = _unmatched_materials(entry, soup, is_whole=False)
+        unused = [text for source in sources for text in source.remarks]
+        remarks = _remarks_of(entry.file, (*unused, *colored.remarks, *unmatched))
         # Images inside mesh files belong to the link, all others to the robot.
         owner = f"{robot_id}/{link_name}" if images else robot_id
         soup = _apply_finishes(colored.soup, entry.materials, place, owner)
@@ -351,6 +353,28 @@ def _apply_finishes(
             _check_placeable(material, finish, soup, f"{place}: material '{slot.name}'")
         slots.append(replace(slot, material=material))
     return replace(soup, slots=tuple(slots))
+
+
+def _unmatched_materials(
+    entry: MeshEntry | RobotEntry, soup: TriangleSoup, *, is_whole: bool
+) -> Iterator[str]:
+    """Remarks on finishes of an entry whose materials the file lacks.
+
+    An entry for several files, links or pieces may name materials of another one: there, a remark
+    needs a similar material without a finish.
+    """
+    names = sorted({slot.name for slot in soup.slots} - {""})
+    fields = {f"materials.{name}": name for name in entry.materials if name != "*"}
+    if isinstance(entry, MeshEntry):
+        regions = enumerate(entry.regions)
+        fields |= {f"regions[{k}].material": region.material for k, region in regions}
+        is_whole = is_whole and not entry.is_one_of_several
+    free = [name for name in names if not any(fnmatchcase(name, p) for p in fields.values())]
+    for field, pattern in fields.items():
+        is_matched = any(fnmatchcase(name, pattern) or name == pattern for name in names)
+        if not is_matched and (is_whole or did_you_mean(pattern, free)):
+            known = one_of(pattern, names) if names else "its materials have no names"
+            yield f"{field} of the index: the file has no material '{pattern}'; {known}"
 
 
 def _find_finish(name: str, finishes: Mapping[str, Finish]) -> Finish | None:

@@ -4,12 +4,13 @@ import re
 import shlex
 import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.errors import ConfigError, StorageError, did_you_mean
 
 if TYPE_CHECKING:
     from gen_data.cli.own_meshes import OwnMesh
@@ -49,14 +50,19 @@ def init(template: str, paths: tuple[Path, ...], categories: tuple[str, ...], ou
         raise ConfigError("--class: names the class of a mesh; expected --mesh with it")
     meshes = find_meshes(paths, categories)
     files = dict(starter_files(template, meshes))
-    with temporary_folder("init") as folder:
-        staging = folder / "files"
-        (staging / ASSETS).mkdir(parents=True)
-        for name, text in files.items():
-            (staging / name).write_text(text, encoding="utf-8", newline="\n")
-        if meshes:
-            write_assets(meshes, staging / ASSETS)
-        _move(staging, out)
+    try:
+        with temporary_folder("init") as folder:
+            staging = folder / "files"
+            (staging / ASSETS).mkdir(parents=True)
+            for name, text in files.items():
+                (staging / name).write_text(text, encoding="utf-8", newline="\n")
+            if meshes:
+                write_assets(meshes, staging / ASSETS)
+            _move(staging, out)
+    except OSError as error:
+        place = error.filename2 or error.filename or out
+        fact = f"{place}: {error.strerror}; choose another folder with --out"
+        raise StorageError(fact) from error
     config = out / next(iter(files))
     written = [*files, *([f"{ASSETS}/"] if meshes else [])]
     click.echo(f"wrote {', '.join(str(out / name) for name in written)}")
@@ -84,14 +90,19 @@ def _echo_command(*arguments: object) -> None:
 
 
 def _move(staging: Path, out: Path) -> None:
-    """Copy all files; none replaces another."""
+    """Copy all files; none replaces another, and after an error none is left."""
     files = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
     existing = [name for name in files if (out / name).exists()]
     if existing:
         raise ConfigError(f"{out / existing[0]}: exists already; choose another folder with --out")
-    for name in files:
-        (out / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(staging / name, out / name)
+    with ExitStack() as undo:
+        for target in (out / name for name in files):
+            for folder in reversed([p for p in target.parents if not p.exists()]):
+                folder.mkdir()
+                undo.callback(folder.rmdir)
+            undo.callback(target.unlink, missing_ok=True)
+            shutil.copyfile(staging / target.relative_to(out), target)
+        undo.pop_all()
 
 
 def starter_files(template: str, meshes: "Sequence[OwnMesh]") -> Iterator[tuple[str, str]]:

@@ -161,7 +161,7 @@ def _selected_outcomes(
     name = str(node.entries[SWITCH].content)
     for key, item in sorted(node.entries.items()):
         if key != SWITCH:
-            value = {} if key == DEFAULT else {name: _scalar(key)}
+            value = {} if key == DEFAULT else {name: read_key(key)}
             yield from _selected_outcomes(item, {**selected, **value})
 
 
@@ -271,7 +271,7 @@ def _outcomes(node: Node) -> tuple[SharedValue, ...]:
         return ()
     values = (item.content for item in argument.items)
     listed = tuple(value for value in values if isinstance(value, (str, int, float)))
-    return listed or tuple(_scalar(key) for key in sorted(argument.entries))
+    return listed or tuple(read_key(key) for key in sorted(argument.entries))
 
 
 def _select_entry(node: Node, shared: Shared, path: FieldPath) -> tuple[str, Node]:
@@ -279,15 +279,18 @@ def _select_entry(node: Node, shared: Shared, path: FieldPath) -> tuple[str, Nod
     name = node.entries[SWITCH]
     value = _look_up(str(name.content), shared, name.position, (*path, SWITCH))
     for key, item in node.entries.items():
-        if key not in (SWITCH, DEFAULT) and _scalar(key) == value:
+        if key not in (SWITCH, DEFAULT) and read_key(key) == value:
             return key, item
     if DEFAULT not in node.entries:
-        fact = f"no entry for {name.content} = {quote_value(value)}; expected one, or '{DEFAULT}'"
-        refuse(node.position, path, fact)
+        known = [key for key in node.entries if key != SWITCH]
+        fact = f"no entry for {name.content} = {quote_value(value)}; expected one, or '{DEFAULT}'; "
+        fact += f"shared.{name.content} may be {errors.list_names(known)}"
+        refuse(node.position, path, fact + errors.did_you_mean(str(value), known))
     return DEFAULT, node.entries[DEFAULT]
 
 
-def _scalar(key: str) -> SharedValue:
+def read_key(key: str) -> SharedValue:
+    """The value that a key of a choice or selection stands for."""
     try:
         value = resolve_scalar(key)
     except ValueError:

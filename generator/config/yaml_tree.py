@@ -99,12 +99,14 @@ class Node:
         content: A scalar, a tuple of nodes (a list), or a dictionary of nodes (a mapping).
         key_positions: Positions of a mapping's keys.
         text: The scalar as written, without quotes.
+        replaced: Inherited declarations that a shared value replaces.
     """
 
     position: Position
     content: PlainScalar | tuple[Node, ...] | Mapping[str, Node]
     key_positions: Mapping[str, Position] = field(default_factory=dict)
     text: str = ""
+    replaced: tuple[Node, ...] = field(default=(), compare=False, repr=False)
 
     def plain(self) -> Any:
         """Dictionaries, lists, strings, numbers, booleans and None."""

@@ -1,10 +1,32 @@
-"""Words by which configurations leave assets out."""
+"""Words by which configurations choose assets and leave them out."""
 
 from collections.abc import Collection, Iterable
 
 from gen_data.core.asset_types import Asset
 from gen_data.core.errors import ConfigError, one_of
 from gen_data.core.interfaces import AssetIndex
+
+SOURCES = frozenset({"pack", "user"})
+"""Tags of assets of installed packs and of the user's folders, of which there may be none."""
+
+
+def check_tags(tags: Collection[str], assets: AssetIndex, field: str) -> None:
+    """Refuse tags that no object of the library has. Raises ConfigError, see ``check_words``."""
+    for tag in tags:
+        if tag not in SOURCES and not assets.find((tag,)):
+            known = SOURCES.union(*(asset.tags for asset in assets.find(())))
+            raise ConfigError(
+                f"{field}: no object has the tag '{tag}'; {one_of(tag, sorted(known))}"
+            )
+
+
+def check_categories(categories: Collection[str], assets: AssetIndex, field: str) -> None:
+    """Refuse categories that no object has. Raises ConfigError, see ``check_words``."""
+    known = {asset.category for asset in assets.find(())} if categories else set()
+    for name in categories:
+        if name not in known:
+            fact = f"no object has the category '{name}'; {one_of(name, sorted(known))}"
+            raise ConfigError(f"{field}: {fact}")
 
 
 def check_words(

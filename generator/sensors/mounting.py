@@ -27,8 +27,8 @@ BURIED_M = 0.05
 class Mounting(Strict):
     """A sensor's place on its rig, from the file of a calibration.
 
-    Files of Kalibr, EuRoC, ORB-SLAM, OpenCV (a pair), ROS (transforms in YAML, URDF), nuScenes and
-    KITTI.
+    Files of Kalibr, EuRoC, ORB-SLAM, OpenCV (a pair), ROS (transforms in YAML, URDF), Autoware,
+    nuScenes and KITTI.
 
     Attributes:
         file: Its name. The place in it replaces this key in the configuration, as ``offset_m``,

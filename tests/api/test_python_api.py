@@ -344,6 +344,8 @@ def test_targets_leave_out_ignored_objects_which_detectors_would_learn(
         assert not target["iscrowd"].any()
         counting = np.flatnonzero(np.logical_not(ignored))
         assert target["boxes"].tolist() == kept["boxes"][counting].tolist()
+    assert [list(b.xyxy) for b in sample.boxes2d["color"]] == target["boxes"].tolist()
+    assert name not in {b.category for b in sample.boxes3d["color"]}
     number = 1 + stored.categories.index(name)
     assert number in lidar_target(stored[0])[1]["labels"]
     assert number not in lidar_target(sample)[1]["labels"]

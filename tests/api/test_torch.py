@@ -87,6 +87,22 @@ def test_rendering_in_training_gives_the_finished_samples(stored: Any, tmp_path:
             assert torch.allclose(one.nan_to_num(posinf=0), other.nan_to_num(posinf=0), atol=6e-5)
 
 
+@pytest.mark.parametrize("workers", [0, 2])
+def test_workers_of_a_data_loader_do_not_repeat_an_epoch(stored: Any, workers: int) -> None:
+    """Each of them would have a copy of the stream: they are refused."""
+    from torch.utils.data import DataLoader
+
+    import gen_data.torch as gt
+
+    batches = DataLoader(gt.loader(stored, batch_size=3), batch_size=None, num_workers=workers)
+    if workers:
+        with pytest.raises(gen_data.ConfigError, match="num_workers: a SampleStream has its own"):
+            list(batches)
+    else:
+        numbers = [int(t["image_id"]) for _, targets in batches for t in targets]
+        assert numbers == list(range(1, 11))
+
+
 def test_laser_boxes_hold_their_points() -> None:
     """Points in the box's frame are inside; as many as counted."""
     import gen_data.torch as gt
@@ -161,6 +177,25 @@ def test_targets_are_wrapped_for_torchvision(stored: Any, monkeypatch: pytest.Mo
     assert wrapped["keypoint_visibility"].tolist() == [[2.0, 0.0]]
     assert type(wrapped["labels"]) is torch.Tensor
     assert type(target["boxes"]) is torch.Tensor, "the target that was passed in is unchanged"
+
+
+def test_rows_of_objects_are_all_that_torchvision_does_not_filter(stored: Any) -> None:
+    """Every tensor with a row per object; it filters boxes and masks by their kinds."""
+    import torch
+
+    import gen_data.torch as gt
+    from gen_data.targets import segmentation_target
+
+    sample = next(s for s in stored if len(s.boxes2d["color"]) > 3)
+    image, target = gt.to_tensors(segmentation_target(sample))
+    count = len(target["boxes"])
+    target |= {"keypoints": torch.rand(count, 5, 2), "keypoint_visibility": torch.rand(count, 5)}
+    listed = gt.object_rows((image, target))
+    others = [
+        v for k, v in target.items() if k not in ("boxes", "masks") and v.shape[:1] == (count,)
+    ]
+    assert {*map(id, listed)} == {*map(id, others)}
+    assert len(listed) == 5
 
 
 def test_importing_the_package_does_not_import_torch() -> None:

@@ -1,6 +1,7 @@
 """Assets that a configuration names and the library lacks."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -73,6 +74,30 @@ def test_an_excluded_word_that_no_object_has_is_refused(override: str, place: st
     assert str(told.value).startswith(place), told.value
     assert "no object has 'foood'" in str(told.value)
     assert "did you mean 'food'?" in str(told.value)
+
+
+@pytest.mark.parametrize(("override", "fact"), [
+    ("elements.clutter.assets={any_of: [household, glaswear]}",
+     "--set:1:34: elements[3].assets.any_of: no object has the tag 'glaswear'; .*'glassware'"),
+    ("elements.clutter.assets={tags: [houshold], ids: [mug]}",
+     "--set:1:32: elements[3].assets.tags: no object has the tag 'houshold'; .*'household'"),
+    ("elements.clutter.assets={tags: [household], prefer: [usr]}",
+     "--set:1:53: elements[3].assets.prefer: no object has the tag 'usr'; .*'user'"),
+])  # fmt: skip
+def test_a_word_that_selects_no_object_is_refused(override: str, fact: str) -> None:
+    with (
+        pytest.raises(ConfigError) as told,
+        open_pipeline(load_config("tabletop.yaml", overrides=[override])),
+    ):
+        pass
+    assert re.match(fact.replace("[", r"\[", 1), str(told.value)), told.value
+
+
+@pytest.mark.parametrize("tag", ["pack", "user"])
+def test_assets_of_packs_and_users_may_be_preferred_where_there_are_none(tag: str) -> None:
+    override = f"elements.clutter.assets={{tags: [household], prefer: [{tag}]}}"
+    with open_pipeline(load_config("tabletop.yaml", overrides=[override])):
+        pass
 
 
 def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: Path) -> None:

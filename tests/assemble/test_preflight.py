@@ -1,5 +1,6 @@
 """Everything that would stop a run is found before it, and all of it at once."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import gen_data
 from gen_data.api.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.cli.main import cli
-from gen_data.core.errors import ConfigError
+from gen_data.core.errors import ConfigError, ConfigWarning
 
 CAMERA = {"type": "rgb_camera", "size_px": [64, 48], "hfov_deg": 60}
 BENT = {**CAMERA, "lens": {"model": "kannala_brandt", "k1": 0.01}}
@@ -237,3 +238,20 @@ def test_text_is_refused_where_nothing_is_written_on() -> None:
     assert f": exporters[0]: exporter 'scene_text': {expected}" in message
     check(prints("apple?seed=0", "mug?seed=0", "mug?seed=44", annotations=["text"]))
     check(prints("apple?seed=0"))
+
+
+def test_a_subcategory_that_no_object_has_is_named_at_its_place() -> None:
+    """The known one in the same map is not."""
+    label_map = {"classes": {"half": ["lemon/halve", "apple/half"]}, "drop": ["apple/halve"]}
+    config = {"extends": "closeup.yaml", "labels": {"map": label_map}}
+    with pytest.warns(ConfigWarning) as warned:
+        check(config)
+    texts = [str(one.message).splitlines()[0] for one in warned]
+    assert len(texts) == 2, texts
+    for text, field, name in zip(
+        texts, ("classes.half[0]", "drop[0]"), ("lemon", "apple"), strict=True
+    ):
+        start = rf".+:\d+:\d+: labels\.map\.{re.escape(field)}: no object is '{name}/halve'; "
+        assert re.match(
+            rf"{start}expected one of .*{name}/half, .*did you mean '{name}/half'", text
+        )

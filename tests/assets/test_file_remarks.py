@@ -1,6 +1,7 @@
 """Unused content of a file is reported: by checks, plans, ``init`` and generation."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -170,3 +171,38 @@ def test_any_name_of_a_file_is_listed(tmp_path: Path, name: str) -> None:
     (root / name).write_text(TRIANGLE + FACE)
     (found,) = findings(root).values()
     assert (found.triangles, found.error) == (1, "")
+
+
+BODY_AND_RIM = f"mtllib a.mtl\n{TRIANGLE}usemtl body\n{FACE}usemtl rim\n{FACE}"
+INDEX = "assets: [{file: FILE, materials: {NAME: {base_color: [0, 1, 0]}}}]\n"
+REGION = "assets: [{file: FILE, regions: [{material: NAME, low_m: [0, 0, 0], high_m: [1, 1, 1], finish: {roughness: 0.1}}]}]\n"  # noqa: E501
+
+
+LACKS = "of the index: the file has no material"
+
+
+@pytest.mark.parametrize(("index", "file", "name", "remark"), [
+    (INDEX, "a.obj", "bdoy",
+     f"materials.bdoy {LACKS} 'bdoy'; expected one of body, rim (did you mean 'body'?)"),
+    (INDEX, "a.obj", "lid", f"materials.lid {LACKS} 'lid'; expected one of body, rim"),
+    (REGION, "a.obj", "bdoy",
+     f"regions[0].material {LACKS} 'bdoy'; expected one of body, rim (did you mean 'body'?)"),
+    (INDEX, "'*.obj'", "bdoy",
+     f"materials.bdoy {LACKS} 'bdoy'; expected one of body, rim (did you mean 'body'?)"),
+    (INDEX, "'*.obj'", "lid", ""), (INDEX, "a.obj", "r?m", ""), (INDEX, "a.obj", "'*'", ""),
+    (REGION, "a.obj", "b*", ""),
+])  # fmt: skip
+def test_finishes_for_materials_that_the_file_lacks_are_named(
+    folder: Path, index: str, file: str, name: str, remark: str
+) -> None:
+    """Entries for several files may have finishes that only some of them need."""
+    (folder / "a.obj").write_text(BODY_AND_RIM)
+    (folder / "a.mtl").write_text("newmtl body\nKd 1 0 0\nnewmtl rim\nKd 1 0 0\n")
+    (folder / "assets.yaml").write_text(index.replace("FILE", file).replace("NAME", name))
+
+    warnings = findings(folder)["user/a"].warnings
+    expected = (f"{folder / 'a.obj'}: {remark}",) if remark else ()
+    assert warnings == (*expected, NO_LICENCE)
+    if remark:
+        with pytest.warns(AssetWarning, match=re.escape(remark)):
+            warn_of_remarks(opened(folder), ["user/a"])

@@ -79,18 +79,26 @@ def test_origins_of_points_are_stored_and_linked(tmp_path: Path) -> None:
 
 
 def test_a_label_map_makes_a_data_set_of_the_users_classes(dataset: Path, tmp_path: Path) -> None:
-    """With the same map, generation gives the same result."""
-    (tmp_path / "map.yaml").write_text("classes: {kitchen: [mug, bowl, cup, plate, bottle]}\n")
+    """With the ids of their order, also in exports of the export, and in Python."""
+    (tmp_path / "map.yaml").write_text(
+        "classes: {kitchen: [mug, bowl, cup, plate, bottle], arm: robot_arm}\n"
+    )
     done = gen_data(
         "export", str(dataset), "-f", "{type: coco, amodal: false}",
         "--label-map", "map.yaml", "-o", "out", cwd=tmp_path,
     )  # fmt: skip
 
     assert done.returncode == 0, done.stderr
+    form = {"type": "coco", "amodal": False}
+    package.export(tmp_path / "out", [form], tmp_path / "again", workers=0)
     files = sorted((tmp_path / "out/coco/annotations").glob("*.json"))
     data = json.loads(files[0].read_text())
-    assert data["categories"] == [{"id": 1, "name": "kitchen", "supercategory": "object"}]
-    assert json.loads((tmp_path / "out/plan.json").read_text())["config"]["labels"]["map"]
+    names = ["kitchen", "arm"]
+    assert [(c["id"], c["name"]) for c in data["categories"]] == [*enumerate(names, 1)]
+    assert (tmp_path / "again/coco/annotations" / files[0].name).read_bytes() == (
+        files[0].read_bytes()
+    )
+    assert package.open(tmp_path / "out").relabelled().categories == tuple(names)
 
 
 @pytest.mark.parametrize(("arguments", "code", "text"), [

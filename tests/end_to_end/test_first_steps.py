@@ -1,5 +1,6 @@
 """The first five minutes: init, plan, formats, describe, completion."""
 
+import errno
 import json
 import re
 import shlex
@@ -13,8 +14,10 @@ from trimesh.exchange.gltf import export_gltf
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.assets.library import open_library
+from gen_data.cli.init_command import init
 from gen_data.cli.own_meshes import guess_unit
 from gen_data.core.asset_types import Asset
+from gen_data.core.errors import StorageError
 from gen_data.exporters import TABLE
 from tests.end_to_end.running import gen_data
 from tests.tiers import sampled
@@ -42,6 +45,37 @@ def test_init_never_overwrites(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "tabletop_scene.yaml: exists already" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["tabletop_scene.yaml"]
+
+
+@pytest.mark.parametrize("out", ["/proc/new/deep", "file", "file/deep"])
+def test_init_names_a_folder_that_cannot_be_written(out: str, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    done = gen_data("init", "--out", out, cwd=tmp_path)
+
+    assert done.returncode == 4, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert re.fullmatch(r"gen-data: (/proc/new|file)\S*: .+; choose another folder .*", line)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_init_leaves_nothing_on_a_disk_that_became_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first file is whole, the second one is cut off."""
+    copied: list[Path] = []
+
+    def copy(source: Path, target: Path) -> None:
+        target.write_bytes(source.read_bytes()[: 10 if copied else None])
+        copied.append(target)
+        if len(copied) == 2:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("gen_data.cli.init_command.shutil.copyfile", copy)
+    with pytest.raises(StorageError, match=r"new: No space left on device; choose another"):
+        init.main(["--out", str(tmp_path / "old/new")], standalone_mode=False)
+
+    assert len(copied) == 2
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow

@@ -1,9 +1,9 @@
 """``gen_data.open`` of a recipe: samples are rendered when they are read, and then kept."""
 
-import argparse
 import importlib.util
 import os
 import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -126,17 +126,18 @@ def test_a_file_that_is_no_recipe_is_refused(author: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_detector_is_trained_from_a_recipe_alone(author: Path, cache: Path) -> None:
+def test_the_detector_is_trained_from_a_recipe_alone(
+    author: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = Path(__file__).parents[2] / "examples" / "train_detector.py"
     spec = importlib.util.spec_from_file_location("train_detector", path)
     assert spec and spec.loader
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
-    args = argparse.Namespace(
-        source=str(author / "recipe.yaml"), seed=0, batch=2, workers=0, size=48, width=4, steps=4,
-        minutes=9.0,
-    )  # fmt: skip
+    given = "--eval none --batch 2 --workers 0 --size 48 --width 4 --steps 4"
+    monkeypatch.setattr(sys, "argv", ["", str(author / "recipe.yaml"), *given.split()])
 
+    args = script.parse_arguments()
     samples = script.open_source(args)
     model = script.train(samples, args)
 

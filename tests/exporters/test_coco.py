@@ -362,6 +362,24 @@ def test_targets_of_trainers_have_the_image_ids_of_the_file(world: Any, tmp_path
     assert len(set(found.values())) == 12
 
 
+def test_keypoints_as_numbers_of_pixels_are_half_a_pixel_less(world: Any, tmp_path: Path) -> None:
+    """Detectron2 adds 0.5; mirrored as width - 1 - x, they stay with the mirrored image."""
+    found = {}
+    for kind in ("places", "pixels"):
+        exporter = Coco(keypoints=kind)
+        folder = world.export(exporter, world.info(7), world.samples, tmp_path / kind)
+        document = json.loads((folder / "annotations/pedestrian_keypoints_train.json").read_text())
+        found[kind] = np.array([row["keypoints"] for row in document["annotations"]])
+        assert ("keypoints" in document["info"]) == (kind == "pixels")
+    places, pixels = (found[kind].reshape(-1, 3) for kind in ("places", "pixels"))
+    seen = places[:, 2] > 0
+    assert 0 < seen.sum() < len(seen)
+    np.testing.assert_allclose(pixels[seen, :2] + 0.5, places[seen, :2], atol=1e-9)
+    np.testing.assert_allclose((160 - 1 - pixels[seen, 0]) + 0.5, 160 - places[seen, 0], atol=1e-9)
+    assert (pixels[~seen] == 0).all()
+    assert (pixels[:, 2] == places[:, 2]).all()
+
+
 def test_targets_of_keypoints_have_one_skeleton(world: Any, tmp_path: Path) -> None:
     """The same points as the file of the category; a model of 17 points gets none of a car's."""
     info = world.info(7)

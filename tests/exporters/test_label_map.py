@@ -15,6 +15,7 @@ from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.errors import ConfigError, ConfigWarning
 from gen_data.core.scene import Scene
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.kitti import Kitti
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap, MappedExporter, public_classes
@@ -52,6 +53,35 @@ def test_classes_are_of_one_or_several_categories(world: Any) -> None:
     counts = categories(world)
     assert len(truths(world, merged)) == counts[first] + counts[second]
     assert len(truths(world, own)) == counts[first]
+
+
+def test_the_order_of_classes_is_part_of_a_configuration_and_survives_sorted_keys(
+    tmp_path: Path,
+) -> None:
+    """Plans have sorted keys; class ids follow the order."""
+    text = "extends: tabletop.yaml\nlabels: {map: {classes: {cup: , bottle: [bottle, jar]}}}\n"
+    (tmp_path / "map.yaml").write_text(text)
+    config = load_config(str(tmp_path / "map.yaml"))
+    kept = canonical_json(config.resolved)
+    (tmp_path / "kept.yaml").write_text(kept)
+    again = load_config(str(tmp_path / "kept.yaml"))
+    assert canonical_json(again.resolved) == kept
+    for one in (config, again):
+        classes = one.general.labels.map.classes_of
+        assert [*classes.items()] == [("cup", ("cup",)), ("bottle", ("bottle", "jar"))]
+    turned = text.replace("cup: , bottle: [bottle, jar]", "bottle: [bottle, jar], cup: ")
+    (tmp_path / "map.yaml").write_text(turned)
+    assert canonical_json(load_config(str(tmp_path / "map.yaml")).resolved) != kept
+
+
+@pytest.mark.parametrize(
+    ("classes", "message"),
+    [([{"cup": None}, {"cup": []}], "a class is listed twice"),
+     ([{"cup": None, "mug": None}], "one class"), (["cup"], "one class")],
+)  # fmt: skip
+def test_listed_classes_are_of_one_name_each(classes: Any, message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        parse(json.dumps({"classes": classes}))
 
 
 def test_other_and_ignored_categories_and_those_below_limits_can_stay_ignored(world: Any) -> None:

@@ -24,6 +24,9 @@ TRAFFIC = DRIVE | {"categories": ("bench", "mug")}
 
 PINHOLES = [*("bop", "cityscapes", "kitti", "kitti_raw", "kitti_tracking", "nuscenes", "openlane"),
             *("scannet", "semantickitti", "solo", "tum_rgbd")]  # fmt: skip
+HYPHENS = {"categories": ("toy-block", "toy block")}
+SCORES = {"categories": ("toy_block", "toy block")}
+ALIKE = "the categories 'toy.block' and 'toy block' are both 'toy.block' in its files"
 NO_PHOTOGRAPH = r"no sensor of color writes the rgb channel"
 TOO_LONG = "there are 10001; expected at most 40000 samples"
 NO_DEPTH = "'color' does not write the channel depth; add it .* leave 'depth' out"
@@ -44,6 +47,7 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("control_clips", {"segmentation": "category"}, NO_IDS, "not write the channel category"),
     ("control_clips", {}, RGB_ONLY, "does not write the channel depth"),
     ("croissant", {}, NO_IMAGE, NO_PHOTOGRAPH),
+    ("dota", {}, HYPHENS, ALIKE),
     ("hdf5", {}, NO_CAMERA, "no camera writes a channel"),
     ("huggingface", {}, NO_IMAGE, NO_PHOTOGRAPH),
     ("kitti", {}, DEPTH_ONLY, NO_PHOTOGRAPH),
@@ -51,6 +55,8 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("kitti", {}, {"n": 1_000_001}, "six digits"),
     ("kitti", {"camera": "colour"}, {}, "camera 'colour'.*one of: color.*did you mean 'color'"),
     ("kitti", {"lidar": "tpo"}, SCANNER, "no lidar 'tpo'.*did you mean 'top'"),
+    ("kitti", {"types": "category"}, SCORES, ALIKE),
+    ("kitti_tracking", {"types": "category"}, DRIVE | SCORES, ALIKE),
     ("kitti_raw", {}, DRIVE | {"lidars": ()}, "no lidar; add a sensor"),
     ("kitti_raw", {}, LONG, TOO_LONG),
     ("kitti_raw", {"image_02": "lefd"}, DRIVE, "camera 'lefd'.*did you mean 'left'"),
@@ -91,6 +97,8 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("tfrecord", {}, NO_IMAGE, NO_PHOTOGRAPH),
     ("tum_rgbd", {}, RGB_ONLY, "camera 'color' does not write the channel depth"),
     ("tum_rgbd", {"imu": "imo"}, DRIVE, "no IMU 'imo'; expected one of: imu"),
+    ("voc", {}, HYPHENS, ALIKE),
+    *(("voc", {}, {"categories": (k,)}, f"category '{k}': labelmap") for k in ("size: L", "#5")),
     ("voc", {}, {"categories": ("c",) * 255}, "room for 254 categories, but there are 255"),
     ("webdataset", {}, {"cameras": ("color", "Color")}, r"'color' and 'Color' differ in case"),
     ("yolo", {"pose_category": "cars"}, {}, r"pose_category: there is no category 'cars'.*car"),

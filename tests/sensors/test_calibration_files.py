@@ -369,6 +369,17 @@ def test_names_of_opencvs_examples_and_the_columns_of_open3d_are_read(
     assert_projects(found.nominal_intrinsics(), project_cv(D5))
 
 
+def test_the_camera_of_a_view_of_open3d_is_read(tmp_path: Path) -> None:
+    """``PinholeCameraParameters``, as its viewer saves them."""
+    content = json.dumps({
+        "class_name": "PinholeCameraParameters", "extrinsic": np.eye(4).ravel().tolist(),
+        "intrinsic": {"width": 640, "height": 512, "intrinsic_matrix": K.T.ravel().tolist()},
+    })  # fmt: skip
+    with pytest.warns(ConfigWarning, match="not used: class_name, extrinsic$"):
+        found = sensor(tmp_path, LENS, "view.json", content=content)
+    assert_projects(found.nominal_intrinsics(), project_cv(np.zeros(5)))
+
+
 def test_json_of_opencv_may_have_comments_and_tabs(tmp_path: Path) -> None:
     """OpenCV writes flags of its sample as a comment: ``// flags: +fix_principal_point``."""
     path = tmp_path / "w.json"
@@ -520,7 +531,9 @@ def test_a_pair_of_opencv_is_placed_by_r_and_t(tmp_path: Path) -> None:
     alone = cv_text(".yml", tmp_path, {"R": R, "T": T})
     same = mounted(tmp_path, "frame: '2', unit: mm", "extrinsics.yml", alone)
     np.testing.assert_allclose(rig_pose(same), rig_pose(found), atol=1e-12)
-    assert "has several cameras, or none" in told(tmp_path, LENS, "extrinsics.yml", content=alone)
+    assert "has no cameras; expected a file that has" in told(
+        tmp_path, LENS, "extrinsics.yml", content=alone
+    )
 
 
 def test_a_place_that_is_probably_in_millimetres_is_pointed_out(tmp_path: Path) -> None:
@@ -541,7 +554,7 @@ transforms:
 ---
 """
 URDF = """\
-<robot name="r"><link name="base_link"/><link name="camera_link"/>
+<robot name="r"><link name="base_link"/><link name="camera_link"/><!-- <calibration> -->
 <link name="camera_optical_frame"/>
 <joint name="a" type="fixed"><parent link="base_link"/><child link="camera_link"/>
 <origin xyz="1.0 0.2 0.5" rpy="0.1 0.2 0.3"/></joint>
@@ -550,8 +563,17 @@ URDF = """\
 """
 
 
+AUTOWARE = """\
+base_link:
+  camera_link: {x: 1.0, y: 0.2, z: 0.5, roll: 0.1, pitch: 0.2, yaw: 0.3}
+camera_link:
+  camera_optical_frame: {x: 0, y: 0, z: 0, roll: -1.57079632679, pitch: 0, yaw: -1.57079632679}
+"""
+
+
 @pytest.mark.parametrize("frame", ["camera_link", "camera_optical_frame"])
 @pytest.mark.parametrize(("name", "content", "angles_deg"), [
+    ("kit.yaml", AUTOWARE, tuple(np.degrees([0.3, -0.2, 0.1]))),
     ("tf.yaml", TF, (2.0 * math.degrees(math.atan2(0.6, 0.8)), 0.0, 0.0)),
     # Rz(yaw) Ry(pitch) Rx(roll): a positive pitch looks down.
     ("robot.urdf", URDF, tuple(np.degrees([0.3, -0.2, 0.1]))),
@@ -576,6 +598,13 @@ def test_transforms_that_ros_prints_one_after_the_other_are_read_together(tmp_pa
     broken = content.replace("z: -0.5", "z: one")
     text = "rig: r, mounting: {file: FILE, frame: camera_link}"
     assert told(tmp_path, text, "tf.yaml", content=broken).startswith("tf.yaml:9:")
+
+
+@pytest.mark.parametrize("suffix", ["optical", "optical_frame", "optical_link"])
+def test_suffixes_of_optical_frames_of_ros(tmp_path: Path, suffix: str) -> None:
+    content = TF.replace("camera_optical_frame", f"camera_{suffix}")
+    found = mounted(tmp_path, f"frame: camera_{suffix}", "tf.yaml", content)
+    assert (found.pitch_deg, found.roll_deg) == pytest.approx((0.0, 0.0))
 
 
 def test_axes_can_be_stated_where_a_name_misleads(tmp_path: Path) -> None:
@@ -790,6 +819,9 @@ LENSES = [
     ("K: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]\nxi: 1.2\nD: [0.1, 0.2, 0, 0]",
      "camera.yaml:2:5: xi: omnidirectional lenses have no lens here"),
     (ROS % ("none", 5, D5.tolist()), UNDISTORTED),
+    *((MESSAGE.replace("---", f"roi: {{x_offset: {x}, y_offset: 0, width: {w}, height: {h}}}"),
+       f"camera.yaml:7:6: roi: {fact} is not inside the image of 640 x 512 pixels")
+      for x, w, h, fact in ((600, 41, 9, "41 x 9 at (600, 0)"), (9, 0, 0, "640 x 512 at (9, 0)"))),
     (MESSAGE.replace("---", "binning_x: 1.5"), "binning_x: expected a whole number"),
     (FIRST.replace("radtan", "none"), UNDISTORTED),
     (FIRST.replace("pinhole", "ds"),
@@ -797,6 +829,8 @@ LENSES = [
     (FIRST.replace("radtan", "fov"),
      "yaml:4:21: distortion_model: 'fov' has no lens here; expected radtan, equidistant or none"),
     (FIRST.replace(", 318.7, 259.3", ""), "yaml:3:15: intrinsics: expected 4 numbers, got 2"),
+    (FIRST.replace("811.9", "-811.9"),
+     "camera.yaml:3:15: intrinsics: focal lengths must be positive, got 812.4 and -811.9"),
     (FIRST.replace("811.9", "one"), "camera.yaml:3:23: intrinsics: expected a number, got 'one'"),
     ("a: 1\n", "camera.yaml:1:1: no camera found; expected a camera matrix"),
     (ROS % ("thin", 5, D5.tolist()), "'thin' is not a known lens; expected one of plumb_bob"),
@@ -808,7 +842,7 @@ LENSES = [
      "camera.yaml:1:14: image size: expected whole numbers, got 640 x 512.5"),
     (COEFFICIENTS.replace("[-0.21, 0.09, 0.0007, -0.0004, -0.012]", "$base64$MWQg"),
      "distortion coefficients: expected a number, got '$base64$MWQg'; write it without Base64"),
-    (KALIBR, "has several cameras, or none: name one; expected one of cam0, cam1"),
+    (KALIBR, "has several cameras: name one; expected one of cam0, cam1"),
 ]  # fmt: skip
 PLACES = [
     ("frame: cam9", "chain.yaml", KALIBR, "has no frame 'cam9'; expected one of cam0, cam1"),
@@ -819,6 +853,9 @@ PLACES = [
      "cam3.T_cn_cnm1: refers to cam2, which the file lacks"),
     ("frame: a", "tf.yaml", TF.replace("w: 0.8", "w: 1.8"), "is not a unit quaternion"),
     ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="'), "expected three numbers"),
+    ("frame: a", "kit.yaml", AUTOWARE.replace("0.3", "left"), "kit.yaml:2:69: yaw: expected"),
+    ("frame: a", "kit.yaml", AUTOWARE + AUTOWARE.partition("\ncamera")[0].replace("base", "other"),
+     "kit.yaml:6:16: camera_link: has two parents"),
     ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>; give a file "
      "of OpenCV, or a URDF"),
     ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="nan'),
@@ -831,6 +868,8 @@ PLACES = [
      "T_cn_cnm1: its last row is 1 0 0 1, expected 0 0 0 1; is the matrix transposed?"),
     ("frame: velodyne", "calib.txt", OBJECT.replace("-0.27", "nan"),
      "calib.txt:4:1: Tr_velo_to_cam: expected a number, got 'nan'"),
+    ("frame: velodyne", "calib.txt", OBJECT.replace("R0_rect: 1 0", "R0_rect: 1 1e308"),
+     "calib.txt:3:1: R0_rect: 1e+308 is too large, expected at most 1e+09"),
     ("frame: velodyne", "calib.txt", OBJECT + OBJECT,
      "calib.txt:6:1: P0: is stated twice, first in line 1"),
     ("frame: cam1, rectified: true", "chain.yaml", KALIBR,
@@ -847,6 +886,9 @@ FAULTS = [
       for words, word in (("nan 256 0.1", "nan"), ("320 256 -inf", "-inf"))),
     (LENS, "a.xml", "<opencv_storage><K>1 2</K>\n <K>1 2</K></opencv_storage>",
      "a.xml:2:2: K: is stated twice"),
+    *((LENS, "cameras.txt", f"1 SIMPLE_PINHOLE {words} 320 256\n", f"cameras.txt:1:1: {fact}")
+      for words, fact in (("640 512 -800", "PARAMS: focal lengths must be positive, got -800"),
+                          ("640 0 800", "the size must be positive, got 640 x 0"))),
     (LENS, "cameras.txt", 2 * "1 PINHOLE 640 512 800 800 320 256\n",
      "cameras.txt:2:1: CAMERA_ID: there are two cameras 1"),
     (LENS.replace("}", ", fisheye: true}"), "camera.yaml", ROS % ("plumb_bob", 4, D4.tolist()),
@@ -860,6 +902,8 @@ FAULTS = [
     ("offset_m: [0, 0, 1], mounting: {file: FILE, frame: cam1}", "camera.yaml", KALIBR,
      "offset_m: the file that mounting names gives it"),
     (LENS.replace("file", "fil"), "camera.yaml", "a: 1\n", "unknown key 'fil'"),
+    (LENS.replace("}", ", rectified: true}"), "camera.yaml", COEFFICIENTS,
+     "camera.yaml:1:1: no camera found; expected a projection matrix such as P or P1; of other"),
     (LENS.replace("}", ", fishy: 1}"), "camera.yaml", "a: 1\n", "unknown key 'fishy'"),
 ]  # fmt: skip
 

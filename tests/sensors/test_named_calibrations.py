@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.assemble.config import parse_config
 from gen_data.core.errors import ConfigWarning
 from gen_data.core.se3 import Array
 from tests.sensors.test_calibration_files import (
@@ -107,30 +108,12 @@ def matrix(name: str, values: Array) -> str:
     return f"{name}: !!opencv-matrix\n{rows}"
 
 
-@pytest.mark.filterwarnings("ignore:.*not used")
-@pytest.mark.parametrize(("name", "content", "frame", "pose"), [
-    ("slam.yaml", "1", "1", POSE),
-    ("slam.yaml", "2", "2", POSE @ RIGHT),
-    ("vins.yaml", "%YAML:1.0\n\nimu: 1\n", "cam1", RIGHT),
-    ("sensor.yaml", "", "camera", POSE),
-])  # fmt: skip
-def test_cameras_of_orb_slam_and_euroc_are_placed_from_the_body(
-    tmp_path: Path, name: str, content: str, frame: str, pose: Array
-) -> None:
-    """``T_b_c1``, ``T_c1_c2`` and ``T_BS`` take points of the camera to the body or camera 1."""
-    if content.startswith("%"):
-        content += matrix("body_T_cam0", POSE) + matrix("body_T_cam1", RIGHT)
-    elif content:
-        second = slam("Camera2", "PinHole").partition('"\n')[2].partition("Camera.width")[0]
-        content = slam("Camera1", "PinHole") + second
-        content += matrix("IMU.T_b_c1", POSE) + matrix("Stereo.T_c1_c2", RIGHT)
-    else:
-        content = EUROC
-    text = f"rig: r, mounting: {{file: FILE, frame: '{frame}', relative_to: body}}"
-    found = sensor(tmp_path, text, name, content=content)
-    np.testing.assert_allclose(rig_pose(found), pose, atol=1e-6)
-
-
+PAIR = (
+    slam("Camera1", "PinHole")
+    + "".join(f"Camera2.{key}: {value}\n" for key, value in FOCAL.items())
+    + matrix("IMU.T_b_c1", POSE)
+    + matrix("Stereo.T_c1_c2", RIGHT)
+)
 EUROC = f"""\
 sensor_type: camera
 T_BS:
@@ -146,11 +129,39 @@ distortion_coefficients: [-0.21, 0.09, 0.0007, -0.0004]
 """
 
 
+@pytest.mark.filterwarnings("ignore:.*not used")
+@pytest.mark.parametrize(("name", "content", "frame", "pose"), [
+    ("slam.yaml", PAIR, "1", POSE),
+    ("slam.yaml", PAIR, "2", POSE @ RIGHT),
+    ("old.yaml", slam("Camera", "PinHole") + matrix("Tbc", POSE) + matrix("Tlr", RIGHT[:3]),
+     "2", POSE @ RIGHT),
+    ("vins.yaml", matrix("body_T_cam0", POSE) + matrix("body_T_cam1", RIGHT), "cam1", RIGHT),
+    ("sensor.yaml", EUROC, "camera", POSE),
+])  # fmt: skip
+def test_cameras_of_orb_slam_and_euroc_are_placed_from_the_body(
+    tmp_path: Path, name: str, content: str, frame: str, pose: Array
+) -> None:
+    """``T_b_c1``, ``T_c1_c2`` and ``T_BS`` take points of the camera to the body or camera 1."""
+    text = f"rig: r, mounting: {{file: FILE, frame: '{frame}', relative_to: body}}"
+    found = sensor(tmp_path, text, name, content=content)
+    np.testing.assert_allclose(rig_pose(found), pose, atol=1e-6)
+
+
 def test_a_sensor_of_euroc_projects_as_opencv_does(tmp_path: Path) -> None:
-    with pytest.warns(ConfigWarning, match="a sensor of EuRoC; not used: sensor_type, .*rate_hz$"):
+    with pytest.warns(ConfigWarning, match="a sensor of EuRoC; not used: rate_hz$"):
         found = sensor(tmp_path, LENS, content=EUROC)
     assert found.size_px == (640, 512)
     assert_projects(found.nominal_intrinsics(), project_cv(D5[:4]))
+
+
+def test_an_imu_of_euroc_is_placed_by_its_sensor_file(tmp_path: Path) -> None:
+    content = EUROC.partition("resolution")[0].replace("camera", "imu")
+    text = "{type: imu, name: imu, rig: r, mounting: {file: imu.yaml}}"
+    (tmp_path / "imu.yaml").write_text(content, encoding="utf-8")
+    config = f"template: tabletop\nsensors: [{text}]\n"
+    with pytest.warns(ConfigWarning, match="not used: rate_hz$"):
+        found: Any = parse_config(config, str(tmp_path / "mine.yaml"), "mine").sensors[0]
+    np.testing.assert_allclose(found.T_rig_sensor.matrix(), POSE, atol=1e-6)
 
 
 def binary(*cameras: tuple[int, int, list[float]], count: int = 0) -> bytes:
@@ -188,18 +199,19 @@ UNREAD: list[Any] = [
     ("a.mat", b"MATLAB 5.0 MAT-file, Platform", "is a MAT-file, which is not read here; use"),
     ("a.xml", b"<?xml version='1.0'?>\n<calibration><f>1</f></calibration>", "XML of Metashape"),
     ("a.cal", b"ParGroup: Cam1: CameraParameters;\n", "is a file of HALCON, which is not read"),
-    ("a.json", b'{"value0": {"T_imu_cam": []}}', "is JSON of Basalt, which is not read here; type"),
+    ("a.json", b'{"value0": {"T_imu_cam": []}}', "is JSON of Basalt, which is not read here;"),
     ("a.usda", b'#usda 1.0\ndef Camera "c" {}\n', "is an OpenUSD stage, which is not read here"),
     ("a.feather", b"ARROW1\x00\x00", "is a table of Arrow, as of Argoverse, which is not read"),
     ("a.json", b'{"beam_altitude_angles": [1.0]}', "is metadata of an Ouster scanner, which"),
     ("a.yaml", b"%YAML:1.0\n---\nmodel_type: MEI\n", "camodocal without a lens here, which is not"),
     ("a.yaml", b"a: 1\n", "no camera found; expected a camera matrix such as K, camera_matrix or M1"
      ", or R and T of a pair; of other formats, type fx_px, fy_px, cx_px, cy_px as intrinsics"),
+    ("a.json", json.dumps({**FOCAL, **BROWN}).encode(), "a.json:1:1: no camera found; expected"),
     ("a.json", nerf("EQUIRECTANGULAR").encode(), "a.json:2:18: camera_model: 'EQUIRECTANGULAR' has "
      "no lens here; expected one of OPENCV, PINHOLE"),
     ("a.json", nerf("OPENCV", k4=0.1).encode(), "a.json:9:8: k4: other than 0 has no lens here"),
     ("a.yaml", slam("Camera", "PinHole").replace("812.4", "-1").encode(),
-     "a.yaml:4:12: focal lengths must be positive, got -1 and 811.9"),
+     "a.yaml:4:12: Camera.fx: focal lengths must be positive, got -1 and 811.9"),
     ("a.yaml", EUROC.replace("0.0, 0.0, 1.0]", "0.0, 0.0, 2.0]").encode(),
      "a.yaml:3:3: T_BS: its last row is 0 0 0 2, expected 0 0 0 1"),
 ]  # fmt: skip

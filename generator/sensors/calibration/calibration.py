@@ -11,6 +11,8 @@ from gen_data.config import problems, yaml_scalars
 from gen_data.config.yaml_tree import Node
 from gen_data.core import errors, lens, scene_time, se3
 
+LARGEST = 1e9
+"""Largest number of a calibration: no pixel, length or coefficient is larger."""
 ROTATION_ERROR_MAX = 1e-2
 """Largest entry of ``R R^T - 1`` of matrices that were printed with few digits."""
 
@@ -150,11 +152,12 @@ class Calibration:
     def _known(self, name: str, known: list[str], kind: str) -> str:
         if name in known:
             return name
-        what = f"has no {kind} '{name}'" if name else f"has several {kind}s, or none: name one"
-        raise ValueError(
-            f"{self.file}, {self.kind}, {what}; expected one of {', '.join(known) or 'none'}"
-            f"{errors.did_you_mean(name, known)}"
-        )
+        place = f"{self.file}, {self.kind},"
+        if not known:
+            raise ValueError(f"{place} has no {kind}s; expected a file that has")
+        what = f"has no {kind} '{name}'" if name else f"has several {kind}s: name one"
+        near = errors.did_you_mean(name, known)
+        raise ValueError(f"{place} {what}; expected one of {', '.join(known)}{near}")
 
 
 def fail(node: Node, field_name: str, fact: str) -> NoReturn:
@@ -174,11 +177,13 @@ def finite(given: object) -> float:
     """A number as Python reads it.
 
     Raises:
-        ValueError: it is not a number, or not a finite one.
+        ValueError: it is not a number, not a finite one, or beyond ``LARGEST``.
     """
     value = float(given)  # type: ignore[arg-type]
     if not math.isfinite(value):
         raise ValueError(f"{value} is not a finite number")
+    if abs(value) > LARGEST:
+        raise ValueError(f"{value:g} is too large, expected at most {LARGEST:g}")
     return value
 
 
@@ -209,7 +214,10 @@ def numbers(node: Node, count: Sequence[int], name: str) -> list[float]:
             hint = "; write it without Base64" if packed else ""
             fact = f"expected a number, got {yaml_scalars.quote_value(leaf.plain())}"
             fail(leaf, name, fact + hint)
-        values.append(float(leaf.content))
+        try:
+            values.append(finite(leaf.content))
+        except ValueError as error:
+            fail(leaf, name, str(error))
     if len(leaves) not in count:
         wanted = " or ".join(str(n) for n in sorted(count))
         fail(given, name, f"expected {wanted} numbers, got {len(leaves)}")
@@ -241,8 +249,7 @@ def check_matrix(K: se3.Array, node: Node, name: str) -> None:
     """Raise ConfigError unless a matrix [3, 3 or 4] is ``fx 0 cx, 0 fy cy, 0 0 1``."""
     if not np.isfinite(K).all():
         fail(node, name, "has a number that is not finite")
-    if min(K[0, 0], K[1, 1]) <= 0.0:
-        fail(node, name, f"focal lengths must be positive, got {K[0, 0]:g} and {K[1, 1]:g}")
+    check_focal(K[0, 0], K[1, 1], node, name)
     if np.abs(K[2, :3] - (0.0, 0.0, 1.0)).max() > 1e-9:
         row = " ".join(f"{value:g}" for value in K[2, :3])
         hint = "; transpose it; of MATLAB, subtract 1 from cx and cy too: its first pixel is (1, 1)"
@@ -252,6 +259,12 @@ def check_matrix(K: se3.Array, node: Node, name: str) -> None:
         skew = K[0, 1] or K[1, 0]
         fact = f"skew {skew:g} has no place in a camera here; expected 0: calibrate without skew"
         fail(node, name, f"{fact} (OpenCV: CALIB_FIX_SKEW)")
+
+
+def check_focal(fx: float, fy: float, node: Node, name: str) -> None:
+    """Raise ConfigError for focal lengths below a thousandth of a pixel."""
+    if min(fx, fy) < 1e-3:
+        fail(node, name, f"focal lengths must be positive, got {fx:g} and {fy:g}")
 
 
 def rigid(values: Sequence[float], node: Node, name: str) -> se3.SE3:

@@ -28,6 +28,7 @@ from gen_data.sensors.calibration.calibration import (
     Frame,
     attempt,
     camera_matrix,
+    check_focal,
     check_rotation,
     fail,
     finite,
@@ -110,9 +111,12 @@ class Entries:
         """The first entry of one of the names, with the number of a camera of a pair."""
         for name in names:
             for key in (f"{name}{number}", f"{name}_{number}")[: 2 if number else 1]:
-                if key in self.root.entries:
-                    self.used.add(key)
-                    return self.root.entries[key]
+                found = self.root.entries.get(key)
+                # k1 and p1 are coefficients, K1 and P1 the matrices of a pair.
+                if found is None or (key[:-1] in ("k", "p", "d") and number and not found.children):
+                    continue
+                self.used.add(key)
+                return found
         return None
 
     def unused(self) -> list[str]:
@@ -156,8 +160,9 @@ def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -
         # OpenCV's sample stereo_calib writes R and T to a separate file.
         frames = _pair_frames(entries)
     if not cameras and not frames:
-        known = "projection matrix such as P" if rectified else "camera matrix such as K"
-        fact = f"no camera found; expected a {known}, {_MATRICES[0]} or M1, or R and T of a pair; "
+        pair = f"camera matrix such as K, {_MATRICES[0]} or M1, or R and T of a pair"
+        known = "projection matrix such as P or P1" if rectified else pair
+        fact = f"no camera found; expected a {known}; "
         fail(root, "", f"{fact}of other formats, type fx_px, fy_px, cx_px, cy_px as intrinsics")
     if "2" in cameras and not rectified:
         frames = _pair_frames(entries)
@@ -238,6 +243,10 @@ def _read_out(camera: CalibratedCamera, entries: Entries) -> CalibratedCamera:
         corner = [_whole(region, f"{axis}_offset") for axis in "xy"]
         width, height = (_whole(region, side) for side in ("width", "height"))
         size = (width, height) if width and height else size
+        whole = camera.size_px or size
+        if size and whole and any(at + n > m for at, n, m in zip(corner, size, whole, strict=True)):
+            fact = f"{size[0]} x {size[1]} at ({corner[0]}, {corner[1]}) is not inside"
+            fail(region, "roi", f"{fact} the image of {whole[0]} x {whole[1]} pixels")
     if size is not None:
         size = (size[0] // bins[0], size[1] // bins[1])
     (fx, fy), (cx, cy) = camera.focal_px, camera.center_px
@@ -360,18 +369,22 @@ def kalibr_chain(root: Node) -> Calibration:
 
 
 def euroc_sensor(root: Node) -> Calibration:
-    """``sensor.yaml`` of a camera of EuRoC and others; ``T_BS`` is its pose in the body's frame.
+    """``sensor.yaml`` of EuRoC and others; ``T_BS`` is the pose of the sensor in the body's frame.
+
+    A camera and its frame are ``camera``; the frame of another sensor has its ``sensor_type``.
 
     Raises:
         ConfigError: the pose is malformed.
     """
     entries = Entries(root)
-    cameras = {"camera": attempt(partial(_kalibr_camera, entries))}
+    is_camera = root.get("camera_model") is not None
+    cameras = {"camera": attempt(partial(_kalibr_camera, entries))} if is_camera else {}
     frames: dict[str, Frame] = {}
-    pose = entries.take(("T_BS",))
+    pose, kind = entries.take(("T_BS",)), entries.take(("sensor_type",))
+    name = "camera" if is_camera or kind is None else kind.text
     if pose is not None:
         place = rigid(numbers(pose, [12, 16], "T_BS"), pose, "T_BS")
-        frames = {"body": Frame(), "camera": Frame("body", place, optical=True)}
+        frames = {"body": Frame(), name: Frame("body", place, optical=is_camera)}
     return Calibration(root.position.file, "a sensor of EuRoC", cameras, frames, entries.unused())
 
 
@@ -406,6 +419,7 @@ def _kalibr_camera(entries: Entries) -> CalibratedCamera:
         fact = f"'{projection.text}' has no lens here; expected pinhole, or omni with xi 0"
         fail(projection, "camera_model", fact)
     fx, fy, cx, cy = rest
+    check_focal(fx, fy, given, "intrinsics")
     name = distortion.text if distortion else "none"
     lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
     if name not in ("radtan", "radial-tangential", "equidistant", "none"):
@@ -481,8 +495,9 @@ def _colmap_camera(place: Position, words: Sequence[str]) -> CalibratedCamera:
     coefficients = [given.get(name, 0.0) for name in COEFFICIENTS[kind]]
     lens = lens_of(kind, coefficients, Node(place, ()), "PARAMS")
     focal = (given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0)))
-    if min(focal) <= 0.0 or min(width, height) < 1:
-        refuse(place, "", "sizes and focal lengths must be positive")
+    check_focal(*focal, Node(place, ()), "PARAMS")
+    if min(width, height) < 1:
+        refuse(place, "", f"the size must be positive, got {width} x {height}")
     return CalibratedCamera(
         place, focal, (given["cx"], given["cy"]), *lens, (width, height), "halves"
     )

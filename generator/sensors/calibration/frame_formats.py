@@ -1,7 +1,8 @@
 """Frames of rigs of ROS, nuScenes and KITTI.
 
 * ROS: ``TransformStamped`` in YAML, as ``ros2 topic echo /tf_static`` prints it, and URDF. By REP
-  103, frames whose names end with ``_optical`` or ``_optical_frame`` have Z forward, others X.
+  103, frames whose names end with ``_optical``, ``_optical_frame`` or ``_optical_link`` have Z
+  forward, others X. Autoware's ``sensor_kit_calibration.yaml``: frames below their parents.
 * nuScenes: ``calibrated_sensor.json`` next to ``sensor.json``; frames are channels, the root is the
   ego vehicle's: on the ground below the middle of the rear axle. Cameras have Z forward; the
   laser scanner has Y forward.
@@ -37,7 +38,7 @@ _NAMES = {
 _NUSCENES = {"token", "sensor_token", "translation", "rotation", "camera_intrinsic"}
 """Keys of a record. nuImages has \
 ``camera_distortion`` of the camera, but its images are undistorted."""
-_OPTICAL = ("_optical", "_optical_frame")
+_OPTICAL = ("_optical", "_optical_frame", "_optical_link")
 
 
 def is_optical(name: str) -> bool:
@@ -78,6 +79,36 @@ def tf_frames(root: Node) -> calibration.Calibration:
         frames[name] = calibration.Frame(above, place, is_optical(name))
         frames.setdefault(above, calibration.Frame(optical=is_optical(above)))
     return calibration.Calibration(root.position.file, "transforms of ROS", {}, frames)
+
+
+_PLACE = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+def is_autoware(root: Node) -> bool:
+    """Whether a file lists frames by their parents, with the six numbers of Autoware."""
+    groups = [group.entries.values() for group in root.entries.values()]
+    return bool(groups) and all(
+        group and all(set(_PLACE) <= set(one.entries) for one in group) for group in groups
+    )
+
+
+def autoware_frames(root: Node) -> calibration.Calibration:
+    """Frames of Autoware: position [m] and angles [rad] below the name of the parent, as in URDF.
+
+    Raises:
+        ConfigError: a number is malformed, or a frame has two parents.
+    """
+    frames = {name: calibration.Frame(optical=is_optical(name)) for name in root.entries}
+    for parent, group in root.entries.items():
+        for name, node in group.entries.items():
+            x, y, z, roll, pitch, yaw = (
+                calibration.numbers(node.entries[key], [1], key)[0] for key in _PLACE
+            )
+            if frames.get(name, calibration.Frame()).parent:
+                calibration.fail(node, name, "has two parents")
+            place = turned((x, y, z), yaw, -pitch, roll)
+            frames[name] = calibration.Frame(parent, place, is_optical(name))
+    return calibration.Calibration(root.position.file, "places of Autoware", {}, frames)
 
 
 def urdf_frames(robot: Element, file: str) -> calibration.Calibration:
@@ -147,9 +178,8 @@ def nuscenes_frames(records: Any, path: Path) -> calibration.Calibration:
         fact = f"needs the names of channels in {table}: {error.strerror}"
         raise ConfigError(f"{path}: {fact}") from None
     except (KeyError, TypeError, ValueError) as error:
-        raise ConfigError(
-            f"{path}: is not a calibrated_sensor.json of nuScenes ({error})"
-        ) from None
+        kind = f"{type(error).__name__}: {error}"
+        raise ConfigError(f"{path}: is not a calibrated_sensor.json of nuScenes ({kind})") from None
     unused = sorted({key for record in records for key in record} - _NUSCENES)
     kind = "calibrated sensors of nuScenes"
     return calibration.Calibration(str(path), kind, cameras, frames, unused, {"rectified"})
@@ -215,9 +245,10 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> calib
 
 def _number(word: str) -> float | str:
     try:
-        return calibration.finite(word)
+        value = float(word)
     except ValueError:
         return word
+    return value if math.isfinite(value) else word
 
 
 def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) -> Any:
@@ -226,7 +257,8 @@ def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) ->
     S = lines.get(f"S_rect_0{number}" if rectified else f"S_0{number}")
     size = tuple(int(v) for v in calibration.numbers(S, [2], "S")) if S else None
     if P is not None:
-        fx, fy, cx, cy = calibration.camera_matrix(P, "P", 4)
+        name = f"P{number}" if f"P{number}" in lines else f"P_rect_0{number}"
+        fx, fy, cx, cy = calibration.camera_matrix(P, name, 4)
         keys = {f"P{number}", f"P_rect_0{number}", f"S_rect_0{number}"}
         camera = calibration.CalibratedCamera(P.position, (fx, fy), (cx, cy), size_px=size)  # type: ignore[arg-type]
         frame = camera_formats.shifted(P, "camera_0")
@@ -239,13 +271,16 @@ def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) ->
     R, T = lines.get(f"R_0{number}"), lines.get(f"T_0{number}")
     if K is None or D is None or R is None or T is None:
         return
-    fx, fy, cx, cy = calibration.camera_matrix(K, "K")
-    lens = camera_formats.lens_of("brown_conrady", calibration.numbers(D, [5], "D"), D, "D")
-    rows = np.array(calibration.numbers(R, [9], "R")).reshape(3, 3)
-    calibration.check_rotation(rows, R, "R")
+    names = [f"{name}_0{number}" for name in "KDRT"]
+    fx, fy, cx, cy = calibration.camera_matrix(K, names[0])
+    coefficients = calibration.numbers(D, [5], names[1])
+    lens = camera_formats.lens_of("brown_conrady", coefficients, D, names[1])
+    rows = np.array(calibration.numbers(R, [9], names[2])).reshape(3, 3)
+    calibration.check_rotation(rows, R, names[2])
     # Points of camera 0 are mapped to points of the camera.
-    pose = SE3.from_matrix(np.column_stack([rows, calibration.numbers(T, [3], "T")])).inverse()
-    keys = {f"{name}_0{number}" for name in "SKDRT"}
+    shift = calibration.numbers(T, [3], names[3])
+    pose = SE3.from_matrix(np.column_stack([rows, shift])).inverse()
+    keys = {f"S_0{number}", *names}
     camera = calibration.CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size)  # type: ignore[arg-type]
     yield camera, calibration.Frame("camera_0", pose, optical=True), keys
 

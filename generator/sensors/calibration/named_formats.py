@@ -2,7 +2,7 @@
 
 * ``transforms.json`` of nerfstudio and instant-ngp: pixel centres at halves, as in COLMAP.
 * Settings of ORB-SLAM2 and 3 and of Stella-VSLAM. ``T_c1_c2`` takes points of camera 2 to camera 1,
-  ``T_b_c1`` takes points of camera 1 to the body.
+  ``T_b_c1`` takes points of camera 1 to the body; so do ``Tlr`` and ``Tbc`` of older files.
 * camodocal (VINS-Mono, VINS-Fusion): its ``k2`` to ``k5`` are OpenCV's ``k1`` to ``k4``;
   ``body_T_cam0`` in another file takes points of the camera to the body.
 """
@@ -77,6 +77,8 @@ _LAYOUTS = (
 _PLACES = (
     ("1", "body", "IMU.T_b_c1"),
     ("2", "1", "Stereo.T_c1_c2"),
+    ("camera", "body", "Tbc"),
+    ("2", "camera", "Tlr"),
     ("cam0", "body", "body_T_cam0"),
     ("cam1", "body", "body_T_cam1"),
 )
@@ -124,8 +126,7 @@ def _camera(
 
     first = entries.root.entries[layout.numbers.split()[0]]
     fx, fy, cx, cy = map(number, layout.numbers.split())
-    if min(fx, fy) <= 0.0:
-        calibration.fail(first, "", f"focal lengths must be positive, got {fx:g} and {fy:g}")
+    calibration.check_focal(fx, fy, first, layout.numbers.split()[0])
     stated = entries.take(layout.model)
     name = stated.text if stated else ""
     fisheye = entries.take(("is_fisheye",))

@@ -4,6 +4,7 @@ import json
 import re
 import struct
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -34,7 +35,9 @@ _UNREAD: Mapping[bytes, tuple[str, str]] = {
     rb"\A\s*\[[A-Za-z]\w*\]\s": ("an INI file, as of ZED cameras", _TYPE),
     rb"\A(PK\x03\x04|\x93NUMPY|\x80[\x02-\x05])": ("an archive of NumPy or Python", _WRITE),
     rb"\A(MATLAB |\x89HDF)": ("a MAT-file", f"use cameraIntrinsicsToOpenCV, and {_WRITE}"),
-    rb"<(calibration|document)\b": ("XML of Metashape", "export the calibration as OpenCV"),
+    rb"\A\s*(<\?xml[^>]*>\s*)?<(calibration|document)\b": (
+        "XML of Metashape", "export the calibration as OpenCV",
+    ),
     rb"\AParGroup": (
         "a file of HALCON",
         "undistort the images, and type Focus / Sx, Focus / Sy, Cx and Cy as intrinsics",
@@ -42,7 +45,9 @@ _UNREAD: Mapping[bytes, tuple[str, str]] = {
     rb"(?m)^model_type:\s*(MEI|SCARAMUZZA)": (
         "a camera of camodocal without a lens here", "calibrate it as KANNALA_BRANDT",
     ),
-    rb'"value0"': ("JSON of Basalt", _TYPE),
+    rb'\A\s*\{\s*"value0"': (
+        "JSON of Basalt", "type kb4 or radtan8 as intrinsics and lens; ds and eucm have none here",
+    ),
     rb"\A(#usda|PXR-USDC)": (
         "an OpenUSD stage", "type hfov_deg: 2 atan(horizontalAperture / (2 focalLength))",
     ),
@@ -93,10 +98,18 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
 def _read_tree(root: Node, *, fisheye: bool, rectified: bool) -> Calibration:
     if any(node.get("camera_model") for node in root.entries.values()):
         return kalibr_chain(root)
-    if root.get("camera_model") and root.get("intrinsics"):
+    if root.get("T_BS") or (root.get("camera_model") and root.get("intrinsics")):
         return euroc_sensor(root)
     if root.get("transforms") or root.get("child_frame_id"):
         return frame_formats.tf_frames(root)
+    if frame_formats.is_autoware(root):
+        return frame_formats.autoware_frames(root)
+    inner = root.get("intrinsic")
+    if inner is not None and inner.get("intrinsic_matrix"):
+        # Open3D: PinholeCameraParameters.
+        others = [key for key in root.entries if key != "intrinsic"]
+        found = camera_file(inner, fisheye=fisheye, rectified=rectified)
+        return replace(found, unused=[*found.unused, *others])
     return named_cameras(root) or camera_file(root, fisheye=fisheye, rectified=rectified)
 
 
