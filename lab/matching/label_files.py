@@ -140,8 +140,7 @@ def _rows(content: Any, kind: str) -> list[tuple[str, Mapping[str, Any]]]:
     for number, row in enumerate(rows):
         if not isinstance(row, dict):
             raise ValueError(f"{kind}[{number}] is {_shown(row)}; expected fields in {{}}")
-        stated = f" (id {_shown(row['id'])})" if "id" in row else ""
-        placed.append((f"{kind}[{number}]{stated}", row))
+        placed.append((f"{kind}[{number}]", row))
     return placed
 
 
@@ -149,13 +148,12 @@ def _field(
     place: str, row: Mapping[str, Any], name: str, read: Callable[[Any], V], expected: str
 ) -> V:
     """The value of a field. Raises ValueError if it is missing, or ``read`` refuses it."""
-    if name not in row:
-        raise ValueError(f"{place}: there is no '{name}'; expected {expected}")
     try:
         return read(row[name])
     except (KeyError, TypeError, ValueError, OverflowError):
-        fact = f"{place}: {name} is {_shown(row[name])}"
-        raise ValueError(f"{fact}; expected {expected}") from None
+        stated = f" (id {_shown(row['id'])})" if "id" in row else ""
+        fact = f"{name} is {_shown(row[name])}" if name in row else f"there is no '{name}'"
+        raise ValueError(f"{place}{stated}: {fact}; expected {expected}") from None
 
 
 def _shown(value: Any) -> str:
@@ -174,11 +172,13 @@ def _id(place: str, row: Mapping[str, Any]) -> Any:
 
 def _pixels(place: str, row: Mapping[str, Any], side: str) -> int:
     """Width or height; 0 = not stated."""
-    return _field(place, {side: row.get(side) or 0}, side, int, "a number of pixels")
+    return _field(place, {**row, side: row.get(side) or 0}, side, int, "a number of pixels")
 
 
 def _coco_box(value: Any) -> Box:
-    x, y, width, height = (_finite(number, "bbox") for number in value)
+    x, y, width, height = map(float, value)
+    if not math.isfinite(x + y + width + height):
+        raise ValueError
     return (x, y, x + width, y + height)
 
 
