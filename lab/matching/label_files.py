@@ -205,6 +205,14 @@ def has_area(box: Box, size_px: tuple[float, float] = (math.inf, math.inf)) -> b
     return math.isinf(width) or (x1 > 0.0 and y1 > 0.0 and x0 < width and y0 < height)
 
 
+def is_there(path: Path, kind: Callable[[Path], bool] = Path.is_file) -> bool:
+    """Whether there is a file, or another kind of path; names may be too long to be any."""
+    try:
+        return kind(path)
+    except OSError:
+        return False
+
+
 def _posix(name: object) -> str:
     """A path as tools on Windows write it, too."""
     return str(name).replace("\\", "/")
@@ -309,13 +317,14 @@ def yolo_splits(path: Path, split: str = "") -> YoloSplits:
         return YoloSplits()
     content = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
     base = path.parent / str(content.get("path") or "")
-    base = base if base.is_dir() else path.parent
+    base = base if is_there(base, Path.is_dir) else path.parent
     places, missing = [], []
     for key in ("train", "val", "test"):
         stated = (content.get(key) or []) if split in key else []
         for name in map(str, stated if isinstance(stated, list) else [stated]):
             # Roboflow writes ../train/images for train/images.
-            found = next(filter(Path.exists, (base / name, base / name.removeprefix("../"))), None)
+            options = (base / name, base / name.removeprefix("../"))
+            found = next((path for path in options if is_there(path, Path.exists)), None)
             if found is None:
                 missing.append((key, name))
             else:
@@ -416,8 +425,11 @@ def _occlusion(value: Any, is_level: bool) -> str:
 
 
 def _number(value: Any) -> float:
-    """A number; -1 for anything else."""
-    return float(value) if isinstance(value, (int, float)) else -1.0
+    """A number; -1 for anything else, and for whole numbers beyond all floats."""
+    try:
+        return float(value) if isinstance(value, (int, float)) else -1.0
+    except OverflowError:
+        return -1.0
 
 
 def _share(value: Any) -> float | None:
