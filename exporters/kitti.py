@@ -119,7 +119,8 @@ class KittiLabels(base.ExporterBase):
     types: Literal["official", "category"] = "official"
     """KITTI's eight types, or the data set's category names (blanks become underscores)."""
     boxes: Literal["projected", "tight"] = "projected"
-    """Image boxes: around the projected 3D box, or around the visible pixels."""
+    """Image boxes: around the projected 3D box (people with ``labels.box3d: annotated``: around the
+    figure), or around the visible pixels."""
     far_m: float = Field(80.0, gt=0)
     """Objects farther than this along the optical axis become DontCare."""
     far_people_m: float | None = Field(None, gt=0)
@@ -149,7 +150,8 @@ class Kitti(KittiLabels):
     type: Literal["kitti"] = "kitti"
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i",
-        box="first and last pixel (i), of the projected 3D box; `boxes: tight` of visible pixels",
+        box="first and last pixel (i), of the projected 3D box, or of annotated figures; "
+        "`boxes: tight` of visible pixels",
         lens=PINHOLE,
         intensity="0 to 1",
     )
@@ -269,7 +271,7 @@ class Kitti(KittiLabels):
             camera=camera,
             points=_SCANNED.format(lidar=self._lidar(info)) if self._lidar(info) else "",
             boxes=_BOXES[self.boxes],
-            truncated="3D box's projection" if self.boxes == "projected" else "silhouette",
+            truncated="unclipped box" if self.boxes == "projected" else "silhouette",
             far=self.far_m,
             people="" if self.far_people_m is None else f" (people: {self.far_people_m:g} m)",
             low=self.low_px,
@@ -491,7 +493,9 @@ def _frame_name(index: int) -> str:
 
 
 _BOXES = {
-    "projected": "around the projection of the 3D box, clipped to the image",
+    "projected": "around the projection of the 3D box, clipped to the image;\n"
+    "            of people with labels.box3d: annotated, around the figure with a margin of\n"
+    f"            {scene.PERSON_MARGIN_M:g} m",
     "tight": "around the visible pixels",
 }
 _SCANNED = """\

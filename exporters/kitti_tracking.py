@@ -54,7 +54,7 @@ class KittiTracking(kitti.KittiLabels):
     type: Literal["kitti_tracking"] = "kitti_tracking"
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i",
-        box="first and last pixel (i), of the projected 3D box",
+        box="first and last pixel (i), of the projected 3D box, or of annotated figures",
         lens=PINHOLE,
         time="number of the frame",
         intensity="0 to 1",

@@ -167,13 +167,12 @@ def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def pack(folder: Path, out: Path | None, force: bool) -> None:
     """Write your FOLDER into one file, with equal bytes for equal content, for a recipe."""
-    from gen_data.core.errors import StorageError
+    from gen_data.core.whole_files import check_new
     from gen_data.packs.own_pack import SUFFIX, write_pack
     from gen_data.runner.durable_files import storage_errors
 
     target = out or Path(f"{folder.resolve().name}{SUFFIX}")
-    if target.exists() and not force:
-        raise StorageError(f"{target}: exists; choose another --out, or replace it with --force")
+    check_new([target], force=force)
     with storage_errors(target, ""):
         digest = write_pack(folder, target)
         click.echo(f"{target}: {_format_mb(target.stat().st_size)}, sha256 {digest}")

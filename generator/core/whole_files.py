@@ -2,7 +2,7 @@
 
 import errno
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -27,6 +27,18 @@ def check_place(path: Path, option: str) -> None:
     except OSError as error:
         fact = f"{error.filename}: {error.strerror}; choose another {option}"
         raise StorageError(fact) from error
+
+
+def check_new(paths: Iterable[Path], *, force: bool) -> None:
+    """Find out, before long work for the files of ``--out``, whether they can be written.
+
+    Raises:
+        StorageError: see ``check_place``; or a file exists, and ``force`` does not replace it.
+    """
+    for path in paths:
+        check_place(path, "--out")
+        if path.exists() and not force:
+            raise StorageError(f"{path}: exists; choose another --out, or replace it with --force")
 
 
 @contextmanager

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.core.errors import ConfigError, StorageError
-from gen_data.core.whole_files import check_place, write_whole
+from gen_data.core.whole_files import check_new, write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from gen_data.lab.matching.results import Match
 
@@ -69,7 +69,7 @@ def match(  # noqa: PLR0913  (keywords of one front door)
     if path.resolve() == Path(source).resolve():
         raise ConfigError(f"--out: {path} is the configuration itself; choose another name")
     targets = [path, path.with_suffix(".json"), path.with_suffix(".html")]
-    _check_places(targets, force)
+    check_new(targets, force=force)
     with threadpool_limits(limits=1):
         found = match_recordings(
             Path(folder),
@@ -90,16 +90,6 @@ def match(  # noqa: PLR0913  (keywords of one front door)
     except OSError as error:
         raise StorageError(f"{error.filename}: {error.strerror}; choose another --out") from error
     return found
-
-
-def _check_places(targets: "Sequence[Path]", force: bool) -> None:
-    """Refuse files that exist, unless ``force`` is set, or that cannot be written."""
-    for target in targets:
-        check_place(target, "--out")
-        if target.exists() and not force:
-            raise StorageError(
-                f"{target}: exists; choose another --out, or replace it with --force"
-            )
 
 
 def _refuse_invalid(text: str, path: Path, source: str) -> None:

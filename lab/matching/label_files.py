@@ -140,8 +140,7 @@ def _rows(content: Any, kind: str) -> list[tuple[str, Mapping[str, Any]]]:
     for number, row in enumerate(rows):
         if not isinstance(row, dict):
             raise ValueError(f"{kind}[{number}] is {_shown(row)}; expected fields in {{}}")
-        stated = f" (id {_shown(row['id'])})" if "id" in row else ""
-        placed.append((f"{kind}[{number}]{stated}", row))
+        placed.append((f"{kind}[{number}]", row))
     return placed
 
 
@@ -149,13 +148,12 @@ def _field(
     place: str, row: Mapping[str, Any], name: str, read: Callable[[Any], V], expected: str
 ) -> V:
     """The value of a field. Raises ValueError if it is missing, or ``read`` refuses it."""
-    if name not in row:
-        raise ValueError(f"{place}: there is no '{name}'; expected {expected}")
     try:
         return read(row[name])
     except (KeyError, TypeError, ValueError, OverflowError):
-        fact = f"{place}: {name} is {_shown(row[name])}"
-        raise ValueError(f"{fact}; expected {expected}") from None
+        stated = f" (id {_shown(row['id'])})" if "id" in row else ""
+        fact = f"{name} is {_shown(row[name])}" if name in row else f"there is no '{name}'"
+        raise ValueError(f"{place}{stated}: {fact}; expected {expected}") from None
 
 
 def _shown(value: Any) -> str:
@@ -174,11 +172,13 @@ def _id(place: str, row: Mapping[str, Any]) -> Any:
 
 def _pixels(place: str, row: Mapping[str, Any], side: str) -> int:
     """Width or height; 0 = not stated."""
-    return _field(place, {side: row.get(side) or 0}, side, int, "a number of pixels")
+    return _field(place, {**row, side: row.get(side) or 0}, side, int, "a number of pixels")
 
 
 def _coco_box(value: Any) -> Box:
-    x, y, width, height = (_finite(number, "bbox") for number in value)
+    x, y, width, height = map(float, value)
+    if not math.isfinite(x + y + width + height):
+        raise ValueError
     return (x, y, x + width, y + height)
 
 
@@ -203,6 +203,14 @@ def has_area(box: Box, size_px: tuple[float, float] = (math.inf, math.inf)) -> b
         return False
     width, height = size_px
     return math.isinf(width) or (x1 > 0.0 and y1 > 0.0 and x0 < width and y0 < height)
+
+
+def is_there(path: Path, kind: Callable[[Path], bool] = Path.is_file) -> bool:
+    """Whether there is a file, or another kind of path; names may be too long to be any."""
+    try:
+        return kind(path)
+    except OSError:
+        return False
 
 
 def _posix(name: object) -> str:
@@ -309,13 +317,14 @@ def yolo_splits(path: Path, split: str = "") -> YoloSplits:
         return YoloSplits()
     content = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
     base = path.parent / str(content.get("path") or "")
-    base = base if base.is_dir() else path.parent
+    base = base if is_there(base, Path.is_dir) else path.parent
     places, missing = [], []
     for key in ("train", "val", "test"):
         stated = (content.get(key) or []) if split in key else []
         for name in map(str, stated if isinstance(stated, list) else [stated]):
             # Roboflow writes ../train/images for train/images.
-            found = next(filter(Path.exists, (base / name, base / name.removeprefix("../"))), None)
+            options = (base / name, base / name.removeprefix("../"))
+            found = next((path for path in options if is_there(path, Path.exists)), None)
             if found is None:
                 missing.append((key, name))
             else:
@@ -416,8 +425,11 @@ def _occlusion(value: Any, is_level: bool) -> str:
 
 
 def _number(value: Any) -> float:
-    """A number; -1 for anything else."""
-    return float(value) if isinstance(value, (int, float)) else -1.0
+    """A number; -1 for anything else, and for whole numbers beyond all floats."""
+    try:
+        return float(value) if isinstance(value, (int, float)) else -1.0
+    except OverflowError:
+        return -1.0
 
 
 def _share(value: Any) -> float | None:

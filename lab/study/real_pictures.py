@@ -409,7 +409,7 @@ def _read_yolo(root: Path, classes: Path, split: str, most: int | None) -> RealS
     else:
         images = {_yolo_labels(path): path for path in _images_among(below)}
         listed = {p for p in below if "labels" in p.relative_to(root).parts} | images.keys()
-    labels = {path for path in listed if path.suffix == ".txt" and path.is_file()}
+    labels = {path for path in listed if path.suffix == ".txt" and label_files.is_there(path)}
     # LabelImg puts its list of classes next to the labels.
     labels = {path for path in labels if path != classes and path.name != "classes.txt"}
     skipped, frames = Counter[str](), []
@@ -445,7 +445,9 @@ def _yolo_labels(image: Path) -> Path:
     """A file next to the image, or by Ultralytics' rule: the last ``images`` becomes ``labels``."""
     nearby = image.with_suffix(".txt")
     before, images, after = nearby.as_posix().rpartition("/images/")
-    return nearby if nearby.is_file() or not images else Path(f"{before}/labels/{after}")
+    return (
+        nearby if label_files.is_there(nearby) or not images else Path(f"{before}/labels/{after}")
+    )
 
 
 def _read_voc(paths: Sequence[Path], most: int | None) -> RealSet:
@@ -466,7 +468,7 @@ def _voc_image(path: Path, stated: Path) -> Path:
     same = [f"{path.stem}{e}" for s in (*PHOTO_SUFFIXES, *UNREAD) for e in (s, s.upper())]
     names = [stated.name, *same] if stated.stem == path.stem else [*same, stated.name]
     listed = (folder / name for name in names if name for folder in folders)
-    return next(filter(Path.is_file, listed), folders[0] / f"{path.stem}.jpg")
+    return next(filter(label_files.is_there, listed), folders[0] / f"{path.stem}.jpg")
 
 
 def _numbered(
@@ -498,7 +500,7 @@ def _readable(
     for frame in chosen:
         found = _read_frame(frame)
         if isinstance(found, str):
-            left_out.setdefault(found, []).append(frame.path.name)
+            left_out.setdefault(found, []).append(frame.path.name[: label_files.SHOWN_MAX])
             continue
         width, height, remarks = found
         skipped.update(f"image that is read, but: {text}" for text in remarks)
@@ -514,7 +516,7 @@ def _readable(
 
 def _read_frame(frame: _Frame) -> tuple[int, int, tuple[str, ...]] | str:
     """Width, height, and remarks on the image; or why it is left out."""
-    if not frame.path.is_file():
+    if not label_files.is_there(frame.path):
         return "image that is missing"
     if why := why_unread(frame.path):
         return f"image: {why}"

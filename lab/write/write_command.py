@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.errors import ConfigError
+from gen_data.core.whole_files import check_new, write_whole
 
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
@@ -74,15 +75,12 @@ def write(
     sheet = out.with_suffix(".png")
     if out.suffix not in (".yaml", ".yml"):
         raise ConfigError(f"--out: {out}; expected a name that ends with .yaml")
-    for path in (out, sheet):
-        if path.exists() and not force:
-            raise StorageError(f"{path}: exists; choose another --out, or replace it with --force")
+    check_new((out, sheet), force=force)
     asked = _open_model(url, command, model, os.environ.get(key_variable, ""), timeout)
     from rich.console import Console
 
     from gen_data.cli.plan_command import plan_rows
     from gen_data.cli.tables import print_facts
-    from gen_data.core.whole_files import write_whole
     from gen_data.lab.write.write import write_config
     from gen_data.runner.durable_files import storage_errors
 

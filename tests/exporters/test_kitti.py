@@ -297,3 +297,19 @@ def test_without_a_scanner_there_are_no_points(world: Any, tmp_path: Path) -> No
     assert kinds == {"image_2", "label_2", "calib"}
     velo_to_cam = devkit_calib(folder / "training/calib/000000.txt")["Tr_velo_to_cam"]
     np.testing.assert_array_equal(velo_to_cam, [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("boxes", "text"),
+    [("projected", "of people with labels.box3d: annotated, around the figure with a margin of\n"
+                   "            0.05 m. "),
+     ("tight", "left top right bottom: around the visible pixels. ")],
+)  # fmt: skip
+def test_the_readme_states_the_boxes_of_figures(
+    boxes: Any, text: str, world: Any, tmp_path: Path
+) -> None:
+    """People of shipped streets have them."""
+    style = kitti.Kitti(boxes=boxes)
+    folder = world.export(style, world.info(1), world.samples[:1], tmp_path)
+    readme = (folder / "README.txt").read_text().replace(".\n", ". ")
+    assert text in readme

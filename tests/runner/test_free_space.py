@@ -68,6 +68,9 @@ def test_a_run_ends_before_the_disk_is_full_but_hard_links_need_no_space(
     check = SpaceCheck(LocalStore(tmp_path, "again"), 1.0, is_forced=True)
     assert "65.5 kB are free; stopped before the disk is full" in str(check.after_shard(100.0, 5))
     assert check.after_shard(100.0, 0) is None
+    # A temporary folder cannot be resumed.
+    check = SpaceCheck(LocalStore(tmp_path, ""), 1.0)
+    assert str(check.after_shard(100.0, 5)).endswith("; stopped before the disk is full.")
 
 
 def test_a_merge_that_will_not_fit_is_refused_before_anything_is_written(

@@ -123,6 +123,7 @@ def test_ids_that_two_rows_of_cocos_file_share_are_refused(kind: str, tmp_path: 
         ([0, 1, 2, 3], ["visible", "partly occluded", "largely occluded", ""]),
         ([0, 1, 1], ["visible", "largely occluded", "largely occluded"]),
         ([37, "?", None], ["", "", ""]),
+        ([0.4, 10**400], ["partly occluded", ""]),
     ],
 )
 def test_occlusion_is_a_share_or_a_number_of_kittis_levels(
@@ -207,6 +208,18 @@ def test_missing_splits_of_yolo_are_named_with_the_nearest_folder(tmp_path: Path
         "val of data.yaml: '/gone', which is missing; all images below are read": 1,
     }
     assert found(tmp_path) == {"images/train/1.png": 1, "images/val/1.png": 1}
+
+
+def test_names_that_no_file_can_have_are_those_of_missing_images(tmp_path: Path) -> None:
+    """Longer than any file system takes; messages show their beginnings."""
+    name = "a" * 3000
+    coco(tmp_path / "coco/a.json", name=f"{name}.png")
+    write(tmp_path / "yolo/data.yaml", f"train: {name}\nval: list.txt\nnames: [cup]\n")
+    write(tmp_path / "yolo/list.txt", f"{name}.png\n")
+    write(tmp_path / "voc/1.xml", VOC.format(f"1{name}.png"))
+    for layout in ("coco", "yolo", "voc"):
+        with pytest.raises(StorageError, match=r"image that is missing \(such as "):
+            read_real(tmp_path / layout)
 
 
 def test_images_of_linked_folders_are_read_once(tmp_path: Path) -> None:
