@@ -81,8 +81,20 @@ class ArmMotion(base.RandomizerBase):
     tilt_deg: dist.NonNegative = dist.Uniform(0.0, 25.0)
     speed: Speed = dist.Uniform(0.4, 0.7)
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raise ConfigError if there is no such object group."""
+        super().check(scene, assets)
+        known = [group.name for group in scene.groups]
+        named = {"objects": self.objects}
+        named |= {f"way[{k}].grasp": stop.grasp or () for k, stop in enumerate(self.way)}
+        for field, groups in named.items():
+            for name in groups:
+                fault = f"randomizers.{self.name}.{field}: there is no object group"
+                base.check_known(name, known, fault)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with a sequence of goals for every arm."""
+        self.check(scene, assets)
         arms = scene.articulations
         arms = tuple(replace(a, task=self._draw_goals(a, scene, assets, rng)) for a in arms)
         return replace(scene, articulations=arms)
@@ -139,8 +151,6 @@ class ArmMotion(base.RandomizerBase):
         """Draw an order of the objects with a side that fits between the fingers."""
         gripper = assets.robot(arm.asset).gripper
         known = [group.name for group in scene.groups]
-        for name in groups:
-            base.check_known(name, known, f"randomizers.{self.name}: there is no object group")
         limit_m = arm_configuration.GRASP_MARGIN * gripper.stroke_m if gripper else 0.0
         wanted = groups or tuple(known)
         held = arm.goal.grasped_object if arm.goal else ""

@@ -94,20 +94,26 @@ class SurfaceRandomizer(RandomizerBase):
         Raises:
             ConfigError: a target is neither a group nor a body.
         """
-        groups = {group.name for group in scene.groups}
-        owners = {body.name.partition("/")[0] for body in scene.bodies}
-        known = sorted(groups | owners)
-        for target in self.targets:
-            check_known(target, known, f"randomizers.{self.name}.targets: there is no")
+        groups = self._check_targets(scene)
         wanted = set(self.targets) or groups
         for body in scene.bodies:
             named = body.group in wanted or body.name.partition("/")[0] in wanted
             if named and not any(assets.get(body.asset).has_word(w) for w in self.exclude):
                 yield body
 
+    def _check_targets(self, scene: Scene) -> set[str]:
+        """Refuse targets that are neither a group nor a body; return the names of all groups."""
+        groups = {group.name for group in scene.groups}
+        owners = {body.name.partition("/")[0] for body in scene.bodies}
+        known = sorted(groups | owners)
+        for target in self.targets:
+            check_known(target, known, f"randomizers.{self.name}.targets: there is no")
+        return groups
+
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """See ``RandomizerBase.check``; excluded words are checked, too."""
+        """See ``RandomizerBase.check``; targets and excluded words are checked, too."""
         super().check(scene, assets)
+        self._check_targets(scene)
         targets = (assets.get(body.asset) for body in scene.bodies)
         check_words(self.exclude, targets, assets, f"randomizers.{self.name}.exclude")
 

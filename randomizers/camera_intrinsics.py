@@ -55,12 +55,16 @@ class CameraIntrinsics(RandomizerBase):
     )
     lens: Coefficients = Coefficients()
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with drawn lenses; lens models and image sizes stay."""
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raise ConfigError if there is no such camera."""
         del assets
         known = [camera.name for camera in scene.cameras]
         if self.camera:
             check_known(self.camera, known, f"randomizers.{self.name}.camera: there is no camera")
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Return the scene with drawn lenses; lens models and image sizes stay."""
+        self.check(scene, assets)
         cameras = tuple(
             self._draw_intrinsics(camera, rng) if self.camera in ("", camera.name) else camera
             for camera in scene.cameras

@@ -14,7 +14,7 @@ from gen_data.core.asset_types import Float32
 from gen_data.core.asset_words import check_categories
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members
-from gen_data.core.scene import Scene, SupportSurface
+from gen_data.core.scene import ObjectGroup, Scene, SupportSurface
 from gen_data.core.se3 import SE3, Array, Vec3
 from gen_data.core.streams import Rng
 from gen_data.randomizers import asset_groups, base
@@ -77,8 +77,9 @@ class ReachingHand(asset_groups.GroupRandomizer):
     raised_m: dist.NonNegative = dist.Choice({0.0: 2.0, 0.03: 1.0, 0.08: 1.0})
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """See ``RandomizerBase.check``; categories are checked, too."""
+        """See ``GroupRandomizer.check``; objects to hold are checked, too."""
         super().check(scene, assets)
+        self._find_things(scene)
         check_categories(self.held_categories, assets, f"randomizers.{self.name}.held_categories")
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
@@ -108,18 +109,20 @@ class ReachingHand(asset_groups.GroupRandomizer):
 
     def _draw_thing(self, scene: Scene, assets: AssetIndex, rng: Rng) -> str:
         """Draw the asset to hold: a category and then one of its assets; empty if there is none."""
-        groups = {group.name: group for group in scene.groups}
-        base.check_known(
-            self.things, groups, f"randomizers.{self.name}.things: there is no object group"
-        )
         by_category: dict[str, list[str]] = {}
-        for asset_id in groups[self.things].assets:
+        for asset_id in self._find_things(scene).assets:
             category = assets.get(asset_id).category
             if category in self.held_categories:
                 by_category.setdefault(category, []).append(asset_id)
         if not by_category:
             return ""
         return base.choose(tuple(by_category[base.choose(tuple(sorted(by_category)), rng)]), rng)
+
+    def _find_things(self, scene: Scene) -> ObjectGroup:
+        groups = {group.name: group for group in scene.groups}
+        fault = f"randomizers.{self.name}.things: there is no object group"
+        base.check_known(self.things, groups, fault)
+        return groups[self.things]
 
     def _draw_reach(self, surface: SupportSurface, rng: Rng) -> _Reach:
         half_x, half_y = 0.5 * surface.size_m[0], 0.5 * surface.size_m[1]

@@ -32,9 +32,13 @@ class RigCalibration(RandomizerBase):
     offset_m: dist.Scalar = dist.Normal(0.0, 0.005, clip=(-0.02, 0.02))
     turn_deg: dist.Scalar = dist.Normal(0.0, 0.2, clip=(-1.0, 1.0))
 
-    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
-        """Return the scene with perturbed sensor poses."""
+    def check(self, scene: Scene, assets: interfaces.AssetIndex) -> None:
+        """Raise ConfigError if no sensor is on such a rig."""
         del assets
+        self._find_rigs(scene)
+
+    def _find_rigs(self, scene: Scene) -> set[str]:
+        """Names of the rigs to perturb."""
         sensors: tuple[Camera | Lidar | Device, ...]
         sensors = (*scene.cameras, *scene.lidars, *scene.devices)
         known = sorted({sensor.rig for sensor in sensors if sensor.rig})
@@ -43,7 +47,12 @@ class RigCalibration(RandomizerBase):
                 f"randomizers.{self.name}.rig: no sensor is on a rig '{self.rig}'; rigs with "
                 f"sensors: {', '.join(known) or 'none'}{errors.did_you_mean(self.rig, known)}"
             )
-        rigs = {self.rig} if self.rig else set(known)
+        return {self.rig} if self.rig else set(known)
+
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
+        """Return the scene with perturbed sensor poses."""
+        del assets
+        rigs = self._find_rigs(scene)
         if self.whole:
             moved = (
                 replace(r, T_body_rig=self._perturb(r.T_body_rig, rng)) if r.name in rigs else r

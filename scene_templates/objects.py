@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from gen_data.assets.families import declared
 from gen_data.config.base_model import Strict
 from gen_data.core import errors
 from gen_data.core.asset_types import Asset
@@ -134,6 +135,12 @@ class Objects(element.Element):
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the group, and its objects in rows on its surfaces, clear of other elements."""
         surfaces = element.find_surfaces(scene, self.on, f"elements.{self.name}.on")
+        bodies = (scene.body(surface.body) for surface in surfaces)
+        if self.placement == "hang" and not any(declared(b.asset, "hooks_m", None) for b in bodies):
+            raise errors.ConfigError(
+                f"elements.{self.name}.placement: nothing can hang on '{self.on}'; expected an "
+                "element of type fruit_bough as 'on', or another placement"
+            )
         discs = [find_keep_out_discs(scene, surface, assets) for surface in surfaces]
         group = ObjectGroup(
             name=self.name,

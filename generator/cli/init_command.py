@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 ASSETS = "assets"
 """Folder of the user's meshes, next to the configuration."""
 
+TAKE_MESHES = ("tabletop", "bin_picking", "shelf", "wrist_camera")
+"""Shipped configurations that ``--mesh`` suits best."""
+
 
 @click.command("init")
 @click.option("--template", "-t", default="tabletop", help="Shipped configuration to start from.")
@@ -133,10 +136,16 @@ def starter_files(template: str, meshes: "Sequence[OwnMesh]") -> Iterator[tuple[
         text = f"{text.rstrip()}\ntemplate: {scene_name}\n"
     if meshes:
         groups = [e["name"] for e in config.resolved["elements"] if e["type"] == "objects"]
-        if not groups or re.search(r"(?m)^(assets|elements|labels):", text):
+        others = f"expected --template {', '.join(TAKE_MESHES[:-1])} or {TAKE_MESHES[-1]}"
+        if not groups:
             raise ConfigError(
-                f"--mesh: the scenes of '{name}' take no objects of your own; expected --template "
-                "tabletop, bin_picking or shelf"
+                f"--mesh: the scenes of '{name}' take no objects of your own; {others}"
+            )
+        if taken := re.search(r"(?m)^(assets|elements|labels):", text):
+            raise ConfigError(
+                f"--mesh: '{name}' has its own '{taken[1]}', which init does not change; {others}; "
+                f"or a configuration with 'extends: {name}' and your objects in "
+                f"elements.{groups[0]}.assets and assets.folders"
             )
         text = f"{text.rstrip()}\n{own_objects(groups[0], meshes, config.resolved)}"
     yield f"{name}.yaml", text

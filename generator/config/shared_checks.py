@@ -38,7 +38,7 @@ def check_shared(document: Node, inherited: Node) -> None:
     used = filled | keys.keys()
     for name in new:
         if name not in used:
-            fact = f"nothing uses this shared value; {one_of(name, sorted(used) or ['none'])}"
+            fact = f"nothing uses this shared value; {one_of(name, sorted(used))}"
             place = section.key_position(name)
             is_wrong = place.file == ORIGIN or did_you_mean(name, used)
             _report(place, name, fact, problems if is_wrong else None)

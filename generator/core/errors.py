@@ -317,6 +317,8 @@ def did_you_mean(wrong: str, known: Iterable[str]) -> str:
 
 def one_of(wrong: str, known: Collection[str], most: int = 12) -> str:
     """``expected one of a, b (did you mean 'a'?)``; of more than ``most`` the nearest five."""
+    if not known:
+        return "there are none"
     if len(known) <= most:
         return f"expected one of {', '.join(known)}{did_you_mean(wrong, known)}"
     near = difflib.get_close_matches(wrong, known, n=5, cutoff=0.0)

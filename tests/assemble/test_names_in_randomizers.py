@@ -37,6 +37,10 @@ def refusal(folder: Path, *lines: str) -> str:
      "no object has the category 'mugg'"),
     ("reaching_hand, name: hands, held_categories: [mugg]", 57, "held_categories",
      "no object has the category 'mugg'"),
+    ("textures, name: t, textures: [wood], targets: [cluter]", 58, "targets",
+     "there is no 'cluter'"),
+    ("camera_intrinsics, name: lens, camera: colour", 51, "camera", "there is no camera 'colour'"),
+    ("arm_motion, name: task, objects: [cluter]", 45, "objects", "no object group 'cluter'"),
     ("camera_pose, name: orbit, aim: cluter", 43, "aim", "nothing in the scene is named 'cluter'"),
     ("camera_pose, name: orbit, camera: colour", 46, "camera", "no camera 'colour'"),
     ("camera_pose, name: orbit, aim: clutter, fills: 0.0005", 59, "fills",
@@ -72,3 +76,25 @@ def test_of_many_textures_the_nearest_are_listed(tmp_path: Path) -> None:
     text = refusal(tmp_path, "{type: textures, name: t, textures: [wod]}")
     assert "did you mean 'wood'?" in text
     assert len(text.splitlines()[0]) < 250
+
+
+@pytest.mark.parametrize(("given", "fact"), [
+    ("camera_pose, name: orbit, rig: ego", "rig: there is no stand 'ego'; there are none"),
+    ("rig_calibration, name: play, rig: ego",
+     "rig: no sensor is on a rig 'ego'; rigs with sensors: none"),
+])  # fmt: skip
+def test_a_rig_in_a_scene_without_rigs_is_refused(tmp_path: Path, given: str, fact: str) -> None:
+    message = refusal(tmp_path, f"{{type: {given}}}")
+    assert f"randomizers[0].{fact}" in message.splitlines()[0]
+
+
+def test_objects_hang_in_boughs_only(tmp_path: Path) -> None:
+    """On a table, every attempt at a layout failed, for want of room as it said."""
+    config = tmp_path / "mine.yaml"
+    config.write_text(HEAD.replace("randomizers:\n", "elements:\n  clutter: {placement: hang}\n"))
+    with pytest.raises(ConfigError) as caught:
+        assert PipelineFactory(load_config(str(config)), n=1).nominal
+    assert str(caught.value).startswith(
+        f"{config}:4:24: elements[3].placement: nothing can hang on 'table'; expected an element "
+        "of type fruit_bough as 'on'"
+    )

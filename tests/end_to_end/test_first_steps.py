@@ -14,7 +14,7 @@ from trimesh.exchange.gltf import export_gltf
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.assets.library import open_library
-from gen_data.cli.init_command import init
+from gen_data.cli.init_command import TAKE_MESHES, init
 from gen_data.cli.own_meshes import guess_unit
 from gen_data.core.asset_types import Asset
 from gen_data.core.errors import StorageError
@@ -76,6 +76,19 @@ def test_init_leaves_nothing_on_a_disk_that_became_full(
 
     assert len(copied) == 2
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("template", TAKE_MESHES)
+def test_templates_for_meshes_take_them(
+    template: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trimesh.creation.box((80.0, 40.0, 30.0)).export(tmp_path / "widget.stl")
+    done = gen_data("init", "-t", template, "--mesh", "widget.stl", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    monkeypatch.chdir(tmp_path)
+    factory = PipelineFactory(load_config(f"{template}.yaml"), n=1)
+    assert "user/widget" in {a for s in factory.nominal for g in s.groups for a in g.assets}
 
 
 @pytest.mark.slow
@@ -184,6 +197,9 @@ def test_the_comments_of_init_tell_how_to_omit_the_robot(template: str, tmp_path
     (("--mesh", "box.stl", "--class", "a", "--class", "b"), 2, "2 names for 1 mesh"),
     (("--class", "a"), 2, "expected --mesh with it"),
     (("--template", "kitti_rig", "--mesh", "junk.stl"), 2, "take no objects of your own"),
+    (("--template", "closeup", "--mesh", "box.stl"), 2, "'closeup' has its own 'labels', .*"
+     "shelf or wrist_camera; or a .*'extends: closeup' .*elements.clutter.assets"),
+    (("--template", "handheld", "--mesh", "box.stl"), 2, "'handheld' has its own 'elements', "),
 ])  # fmt: skip
 def test_init_refuses_what_it_cannot_write(
     tmp_path: Path, arguments: tuple[str, ...], code: int, text: str

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library
+from gen_data.assets.library import Library, open_library
 from gen_data.config.distributions import Constant, Probability
 from gen_data.content.procedural import FAMILIES
 from gen_data.content.procedural.hands import JOINTS, held_axis_m
-from gen_data.core.errors import AssetError
+from gen_data.core.errors import AssetError, ConfigError
 from gen_data.core.scene import ObjectGroup, Scene, SupportSurface
 from gen_data.core.se3 import SE3
 from gen_data.core.skeletons import find_skeleton
@@ -126,3 +126,9 @@ def test_unknown_poses_and_radii_are_refused() -> None:
         FAMILIES["hand"].build(seed=0, pose="wave")
     with pytest.raises(ValueError, match="are not all from 15 to 46"):
         FAMILIES["hand"].build(seed=0, pose="grasp", radii_mm=(9.0, 9.0, 9.0, 9.0))
+
+
+def test_an_unknown_group_of_objects_to_hold_is_refused_before_a_run() -> None:
+    hand = reaching(holding=True).model_copy(update={"things": "cluter"})
+    with pytest.raises(ConfigError, match=r"no object group 'cluter'; .*did you mean 'clutter'"):
+        hand.check(table(HELD), open_library(()))
