@@ -56,11 +56,14 @@ class CameraIntrinsics(RandomizerBase):
     lens: Coefficients = Coefficients()
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if there is no such camera."""
+        """Raise ConfigError if there is no such camera, or its lens has no such coefficients."""
         del assets
         known = [camera.name for camera in scene.cameras]
         if self.camera:
             check_known(self.camera, known, f"randomizers.{self.name}.camera: there is no camera")
+        for camera in scene.cameras:
+            if self.camera in ("", camera.name):
+                self._check_lens_model(camera)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with drawn lenses; lens models and image sizes stay."""
@@ -73,7 +76,6 @@ class CameraIntrinsics(RandomizerBase):
 
     def _draw_intrinsics(self, camera: Camera, rng: Rng) -> Camera:
         before = camera.intrinsics
-        self._check_lens_model(camera)
         hfov_deg = None if self.hfov_deg is None else self.hfov_deg.draw(rng)
         given = self.principal_offset_px
         axes = given if isinstance(given, tuple) else (given, given)
@@ -107,8 +109,8 @@ class CameraIntrinsics(RandomizerBase):
             known = " ".join(COEFFICIENTS[lens.model]) or "no coefficients"
             raise ConfigError(
                 f"randomizers.{self.name}.lens: camera '{camera.name}' has a lens of the model "
-                f"'{lens.model}' with {known}, not {' '.join(missing)}; give sensor "
-                f"'{camera.name}' another lens or name another camera"
+                f"'{lens.model}' with {known}, not {' '.join(missing)}; expected "
+                f"another lens of sensor '{camera.name}', or the name of another camera"
             )
         widest_deg = 0.0 if self.hfov_deg is None else self.hfov_deg.support()[1]
         if lens.model == "pinhole" and widest_deg > PINHOLE_MAX_DEG:

@@ -1,7 +1,7 @@
 """Configurations: read, merged with their templates, and validated."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
@@ -22,12 +22,12 @@ from gen_data.assemble.plugin_tables import (
     SENSORS,
     find_other_list,
 )
-from gen_data.config import shared_values
+from gen_data.config import merging, shared_values
 from gen_data.config.base_model import Strict
 from gen_data.config.paths import PLAN, find_path
 from gen_data.config.problems import Problems
 from gen_data.config.validation import validate
-from gen_data.config.yaml_scalars import json_as_yaml
+from gen_data.config.yaml_scalars import json_as_yaml, quote_value
 from gen_data.config.yaml_tree import Node
 from gen_data.core import bounded_cache, errors, interfaces, scene
 from gen_data.core.plugins import PluginTable
@@ -474,8 +474,9 @@ def _plugins(
     made: list[P] = []
     names: set[str] = set()
     tag = "name" if key in VARYING else "type"
+    inherited = {merging.node_name(node) for node in listed.items if node.get("type")}
     for number, node in enumerate(listed.items):
-        make = partial(_plugin, node, f"{key}[{number}]", table, problems)
+        make = partial(_plugin, node, f"{key}[{number}]", table, problems, inherited=inherited)
         plugin = known.plugin(key, node, make)
         name = getattr(plugin, tag, None)
         if name is not None and name in names:
@@ -491,15 +492,29 @@ def _plugins(
 
 
 def _plugin(
-    node: Node, field: str, table: PluginTable[P], problems: Problems, default: str | None = None
+    node: Node,
+    field: str,
+    table: PluginTable[P],
+    problems: Problems,
+    default: str | None = None,
+    *,
+    inherited: Collection[str] = (),
 ) -> P | None:
-    """Make the plug-in that an entry names, or else the default one; None if it has errors."""
+    """Make the plug-in that an entry names, or else the default one; None if it has errors.
+
+    ``inherited`` has the names that an entry without a type might have meant.
+    """
     tag = node.get(table.tag)
     name = default if tag is None else tag.content
     where = (tag or node).position
     if not isinstance(name, str):
         named = "" if tag is not None else f"a mapping with '{table.tag}', which names "
         fact = f"expected {named}one {table.kind} of: {', '.join(table)}"
+        own = node.get("name")
+        if tag is None and own is not None and inherited:
+            near = errors.did_you_mean(own.text, sorted(inherited))
+            fact = f"nothing inherited is named {quote_value(own.content)}{near}; {fact}"
+            where = own.position
         problems.add(where, f"{field}.{table.tag}", fact)
         return None
     try:

@@ -148,6 +148,7 @@ class PipelineFactory:
         for probe, scene in zip(self.config.probes, self.nominal, strict=True):
             for find in (preflight.far_sensors, preflight.cameras_that_look_away):
                 texts |= dict.fromkeys(find(probe, scene))
+            texts |= dict.fromkeys(preflight.single_towers(scene, self.library))
         for text in texts:
             warnings.warn(text, ConfigWarning, stacklevel=3)
 

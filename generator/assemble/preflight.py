@@ -158,6 +158,18 @@ def far_sensors(config: SceneConfig, scene: Scene) -> Iterator[str]:
             )
 
 
+def single_towers(scene: Scene, assets: interfaces.AssetIndex) -> Iterator[str]:
+    """Groups with the placement ``stack`` of objects that are not stackable: each stands alone."""
+    for group in scene.groups:
+        stacked = group.assets if group.placement == "stack" else ()
+        if stacked and not any(assets.get(asset).stackable for asset in stacked):
+            yield (
+                f"elements.{group.name}.placement: stack: none of its assets is stackable, and "
+                "they stand apart as with scatter; expected assets that are flat above and below "
+                "(yours with stackable: true in assets.yaml), or another placement"
+            )
+
+
 def cameras_that_look_away(config: SceneConfig, scene: Scene) -> Iterator[str]:
     """Cameras on carriers that stand still, whose image shows nothing of the scene's focus."""
     moves = any(isinstance(randomizer, RoomPath) for randomizer in config.randomizers)

@@ -80,7 +80,8 @@ def _inspect(one: IndexedAsset, library: Library) -> Finding:
     triangles, low, high = measure(one, library)
     size_m = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
     _open_images(one, library)
-    warnings = (*_find_doubts(one, max(size_m)), *_list_remarks(one, library), *origin)
+    doubts = (*_find_doubts(one, max(size_m)), *_far_keypoints(one, low, high))
+    warnings = (*doubts, *_list_remarks(one, library), *origin)
     found = (triangles, size_m, _describe_unit(one), _describe_up(one))
     return Finding(one.asset_id, one.kind, one.category(), *found, warnings=warnings)
 
@@ -169,6 +170,19 @@ def _describe_up(one: IndexedAsset) -> str:
     if entry.up is None and Path(entry.file).suffix.lower().startswith((".usd", ".dae")):
         return ""
     return entry.up or f"{entry.up_axis()} (assumed)"
+
+
+def _far_keypoints(one: IndexedAsset, low: se3.Vec3, high: se3.Vec3) -> Iterator[str]:
+    """Keypoints farther from the bounding box [m] than it is long, as with a wrong unit."""
+    longest_m = max(np.subtract(high, low))
+    for point in one.entry.keypoints if isinstance(one.entry, MeshEntry) else ():
+        nearest_m = np.clip(point.position_m, low, high)
+        away_m = float(np.linalg.norm(nearest_m - point.position_m))
+        if away_m > longest_m:
+            yield (
+                f"keypoint '{point.name}' is {away_m:.3g} m away from the object, which is "
+                f"{longest_m:.3g} m long; expected metres in the finished frame"
+            )
 
 
 def _find_doubts(one: IndexedAsset, longest_m: float) -> Iterator[str]:

@@ -613,6 +613,8 @@ def _check_files(index: FolderIndex, root: Path, document: Node, problems: Probl
             position, field = find_text(entry_node, name) or (entry_node.position, "file")
             kind = "matches no file" if is_pattern(name) else "no such file"
             near = did_you_mean(name, below) or f"; the folder has {_count_by_suffix(below)}"
+            if not (root / name).resolve().is_relative_to(root.resolve()):
+                kind, near = "is outside of the folder", f"; expected a file in {root}"
             problems.add(position, f"{section}[{number}].{field}", f"'{name}': {kind}{near}")
 
 

@@ -71,7 +71,7 @@ def preview(
         info = pipeline.info
         if save is not None:
             save_recording(save, samples, pipeline.assets, info=info, points=points)
-            click.echo(f"{save}: {n} samples; open it with: rerun {save}")
+            click.echo(f"{save}: {n} sample{'' if n == 1 else 's'}; open it with: rerun {save}")
             return
         viewer = serve_web(host) if web else open_window()
         if web:
@@ -124,6 +124,10 @@ def contact_sheet(
     SOURCES are configurations (paths or shipped names) or folders of data sets, in the order of
     the tiles.
     """
+    if out.suffix.lower() not in ("", ".png"):
+        raise ConfigError(
+            f"--out {out}: a contact sheet is a PNG; expected {out.with_suffix('.png')}"
+        )
     from gen_data.assemble.config import load_config
     from gen_data.assemble.pipeline_factory import open_pipeline
     from gen_data.preview.contact_sheet import arrange_tiles, make_tiles, render_tiles, write_sheet
@@ -141,7 +145,7 @@ def contact_sheet(
             drawn = make_tiles(samples, shown, labels=labels, views=views, width_px=tile_px)
             images += render_tiles(drawn, tile_px, captions=captions)
     write_sheet(arrange_tiles(images, columns), out)
-    click.echo(f"{out}: {len(images)} tiles")
+    click.echo(f"{out}: {len(images)} tile{'' if len(images) == 1 else 's'}")
 
 
 def _samples(

@@ -13,7 +13,7 @@ from gen_data.core.errors import ConfigWarning, did_you_mean, one_of
 def check_shared(document: Node, inherited: Node) -> None:
     """Compare shared values with their uses, and with the declarations that they replace.
 
-    Values of names that fill fields are left to these fields.
+    Values of names that fill fields are left to these fields, unless a selection has no default.
 
     Args:
         document: The merged document.
@@ -34,7 +34,8 @@ def check_shared(document: Node, inherited: Node) -> None:
         return
     keys: dict[str, set[str]] = {}
     filled: set[str] = set()
-    _find_uses(document, keys, filled)
+    strict: set[str] = set()
+    _find_uses(document, keys, filled, strict)
     used = filled | keys.keys()
     for name in new:
         if name not in used:
@@ -43,20 +44,25 @@ def check_shared(document: Node, inherited: Node) -> None:
             is_wrong = place.file == ORIGIN or did_you_mean(name, used)
             _report(place, name, fact, problems if is_wrong else None)
     for name, node in section.entries.items():
-        if name in keys and name not in filled:
+        if name in keys and (name not in filled or name in strict):
             _check_values(name, node, keys[name], problems)
     problems.raise_if_any()
 
 
-def _find_uses(node: Node, keys: dict[str, set[str]], filled: set[str]) -> None:
-    """Collect the keys of selections by name, and the names that stand for a value."""
+def _find_uses(node: Node, keys: dict[str, set[str]], filled: set[str], strict: set[str]) -> None:
+    """Collect the keys of selections by name, and the names that stand for a value.
+
+    ``strict`` receives the names with a selection that has no default.
+    """
     if SWITCH in node.entries:
         name = str(node.entries[SWITCH].content)
         keys.setdefault(name, set()).update(node.entries.keys() - {SWITCH, DEFAULT})
+        if DEFAULT not in node.entries:
+            strict.add(name)
     elif is_reference(node):
         filled.add(str(node.content).removeprefix(REFERENCE))
     for child in node.children.values():
-        _find_uses(child, keys, filled)
+        _find_uses(child, keys, filled, strict)
 
 
 def _check_values(name: str, node: Node, keys: set[str], problems: Problems) -> None:

@@ -5,8 +5,9 @@ its field, and states it in terms of the YAML file instead of pydantic's.
 """
 
 import json
+import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -15,7 +16,7 @@ from gen_data.config.distributions import MEANT, Malformed
 from gen_data.config.problems import FieldPath, Position, Problems, format_path
 from gen_data.config.schema import FieldSchema
 from gen_data.config.yaml_scalars import quote_value, to_flow_yaml
-from gen_data.config.yaml_tree import Node
+from gen_data.config.yaml_tree import Node, is_distribution
 from gen_data.core.errors import did_you_mean
 
 if TYPE_CHECKING:
@@ -47,10 +48,27 @@ def validate(
     except ValidationError as error:
         details = error.errors(include_url=False)
     for fault in select_union_branch([locate_error(detail, model) for detail in details]):
+        text = error_text(fault)
+        if fault.kind == "value_error" and (part := _named_part(node, fault, text)):
+            fault = replace(fault, path=(*fault.path, *part))  # noqa: PLW2901
+            text = text.removeprefix(f"{'.'.join(map(str, part))}: ")
         path = format_path(fault.path)
         joint = "." if field_prefix and path and not path.startswith("[") else ""
-        problems.add(_position(node, fault), f"{field_prefix}{joint}{path}", error_text(fault))
+        problems.add(_position(node, fault), f"{field_prefix}{joint}{path}", text)
     return None
+
+
+def _named_part(node: Node, fault: "Fault", text: str) -> FieldPath:
+    """Path from a mapping as a whole to the key with which the text of its fault begins.
+
+    Empty if the text begins with no key of the mapping, or the mapping is a distribution.
+    """
+    begin = re.match(r"([a-z]\w*(?:\.\w+)*):? ", text)
+    place = None if fault.below else node.get(*fault.path)
+    path = begin[1].split(".") if begin else []
+    if place is None or is_distribution(place) or not path:
+        return ()
+    return tuple(path) if place.get(*path) else ()
 
 
 def _position(node: Node, fault: "Fault") -> Position:

@@ -92,14 +92,15 @@ def test_names_that_may_be_drawn_are_checked_when_read(override: str, message: s
 
 
 def test_errors_that_only_a_drawn_scene_shows_have_their_place() -> None:
-    """The first sample finds that no body and no group has this name."""
-    choice = ["randomizers.cover.targets=[clutter, tabel]", "physics.settle_time_s_max=0.1"]
+    """A drawn lamp is a sun, which has no flux."""
+    lamps = "{type: lighting, name: lamps, kind: sun, luminous_flux_lm: 800}"
+    choice = [f"randomizers.lamps={lamps}", "randomizers.clutter.count=0"]
+    choice.append("randomizers.distractors.count=0")
     with (
         PipelineFactory(load_config("tabletop.yaml", overrides=choice), 1)() as pipeline,
         pytest.raises(ConfigError) as caught,
     ):
         pipeline.sample(0)
 
-    message = "--set:1:27: randomizers[6].targets: there is no 'tabel'; expected one of"
-    assert str(caught.value).startswith(message)
-    assert "(did you mean 'table'?)" in str(caught.value)
+    message = "--set:1:78: randomizers[9].luminous_flux_lm: a sun has no flux; give an"
+    assert str(caught.value).startswith(message), caught.value

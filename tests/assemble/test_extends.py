@@ -225,3 +225,16 @@ def test_defaults_for_a_type_that_no_element_has_are_refused(tmp_path: Path) -> 
 
     assert f"{tmp_path / 'tables.yaml'}:1:12: defaults.surfaces: no element is of this" in message
     assert "did you mean 'surface'?" in message
+
+
+@pytest.mark.parametrize(("text", "place", "near"), [
+    ("sensors: [{name: colour, size_px: [64, 48]}]", "2:18: sensors[1].type", "color"),
+    ("randomizers: [{name: cluter, count: 3}]", "2:22: randomizers[2].type", "clutter"),
+])  # fmt: skip
+def test_a_change_of_an_inherited_plugin_that_does_not_exist_names_the_nearest(
+    folder: Path, text: str, place: str, near: str
+) -> None:
+    told = refusal(written(folder, f"extends: base.yaml\n{text}\n"))
+    name = text.partition("name: ")[2].partition(",")[0]
+    fact = f"nothing inherited is named '{name}' (did you mean '{near}'?); expected a mapping with"
+    assert f"mine.yaml:{place}: {fact} 'type', which names one " in told

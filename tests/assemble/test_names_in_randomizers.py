@@ -40,6 +40,8 @@ def refusal(folder: Path, *lines: str) -> str:
     ("textures, name: t, textures: [wood], targets: [cluter]", 58, "targets",
      "there is no 'cluter'"),
     ("camera_intrinsics, name: lens, camera: colour", 51, "camera", "there is no camera 'colour'"),
+    ("camera_intrinsics, name: lens, hfov_deg: 60, lens: {k1: 0.1}", 63, "lens",
+     "model 'pinhole' with no coefficients, not k1; "),
     ("arm_motion, name: task, objects: [cluter]", 45, "objects", "no object group 'cluter'"),
     ("camera_pose, name: orbit, aim: cluter", 43, "aim", "nothing in the scene is named 'cluter'"),
     ("camera_pose, name: orbit, camera: colour", 46, "camera", "no camera 'colour'"),

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 import yaml
 from click.testing import CliRunner
 
@@ -255,3 +256,18 @@ def test_a_subcategory_that_no_object_has_is_named_at_its_place() -> None:
         assert re.match(
             rf"{start}expected one of .*{name}/half, .*did you mean '{name}/half'", text
         )
+
+
+def test_stacks_of_objects_that_are_not_stackable_are_doubtful(tmp_path: Path) -> None:
+    """A mesh of a user is not, unless the index states it."""
+    box = trimesh.creation.box((0.05, 0.05, 0.05))
+    box.export(tmp_path / "block.stl")
+    group = {"placement": "stack", "assets": {"ids": ["user/block"]}}
+    config = table(
+        {"name": "color", **CAMERA},
+        assets={"folders": [str(tmp_path)]}, elements={"clutter": group},
+    )  # fmt: skip
+    with pytest.warns(ConfigWarning, match=r"elements.clutter.placement: stack: none of its asset"):
+        check(config)
+    (tmp_path / "assets.yaml").write_text("assets: [{file: block.stl, stackable: true}]\n")
+    check(config)

@@ -46,6 +46,8 @@ def refusal(name: str, *overrides: str) -> str:
     ("street", "shared.landmark=brige", 17, "unknown value 'brige'; expected one of bridge, none, "
      "petrol, rail, square (did you mean 'bridge'?)"),
     ("street", "shared.cut={choice: {wals: 1, none: 1}}", 22, "unknown value 'wals'; .*'walls'"),
+    ("street", "shared.parking=paralel", 16, "unknown value 'paralel'; .*'parallel'"),
+    ("street", "shared.season=wintr", 15, "unknown value 'wintr'; .*'winter'"),
     ("street", "shared.robott=kuka", 8, "nothing uses this shared value; "),
     ("street", "shared.junctoin=x", 8, "nothing uses this shared value; .*did you mean 'junction'"),
 ])  # fmt: skip

@@ -53,6 +53,22 @@ def test_every_asset_is_found_out_about(folder: Path, tmp_path: Path) -> None:
     assert found["user/arm"].error == ""
 
 
+def test_a_keypoint_far_from_its_object_is_doubtful(tmp_path: Path) -> None:
+    """The corner is 20 mm from the centre; the tip may be beyond the end, the other in mm."""
+    write_box(tmp_path / "bolt.stl", (8.0, 8.0, 40.0))
+    points = {"corner": [0.004, 0.004, 0.02], "tip": [0, 0, 0.05], "far": [0, 0, 5.02]}
+    listed = ", ".join(f"{{name: {name}, position_m: {at}}}" for name, at in points.items())
+    (tmp_path / "assets.yaml").write_text(
+        f"licence: CC0-1.0\nassets: [{{file: bolt.stl, unit: mm, keypoints: [{listed}]}}]\n"
+    )
+    library = open_library([tmp_path], cache_dir=tmp_path / "cache")
+    (found,) = check_folder(tmp_path, library)
+    assert found.warnings == (
+        "keypoint 'far' is 5 m away from the object, which is 0.04 m long; expected metres in the "
+        "finished frame",
+    )
+
+
 def test_a_robot_is_measured_at_home(folder: Path, tmp_path: Path) -> None:
     """By hand: the shoulder at 1 rad tips 0.4 m of arm and a ball of radius 0.05 m over."""
     library = open_library([folder], cache_dir=tmp_path / "cache")

@@ -291,6 +291,10 @@ def test_a_pattern_stands_for_every_file_that_matches(folder: Path) -> None:
         ("{file: '*.obj'}", r"2:12: assets\[0\]\.file: '\*\.obj': matches no file; .* 1 \.stl"),
         ("{id: a, file: cup.stl, materials: {x: {maps: {color: w.png}}}}",
          r"2:58: assets\[0\]\.materials\.x\.maps\.color: 'w\.png': no such file"),
+        ("{file: ../cup.stl}",
+         r"2:12: assets\[0\]\.file: '\.\./cup\.stl': is outside of the folder; expected a file in"),
+        ("{file: /tmp/cup.stl}",
+         r"2:12: assets\[0\]\.file: '/tmp/cup\.stl': is outside of the folder"),
     ],
 )  # fmt: skip
 def test_a_missing_file_is_told_in_place(folder: Path, entry: str, fault: str) -> None:

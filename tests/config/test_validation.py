@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum
 from typing import Annotated, Any, Literal
 
@@ -303,3 +304,34 @@ def test_any_document_gives_a_model_or_problems(plain: dict[str, Any]) -> None:
         assert problem.fact
         assert "Input should" not in problem.fact
         assert problem.field or "unlucky" in problem.fact
+
+
+class Parts(Strict):
+    width: int = 1
+    lens: Mapping[str, int] = {}
+
+    @model_validator(mode="after")
+    def _fits(self) -> Parts:
+        if self.width > 9:
+            raise ValueError(f"width: {self.width} is too wide; expected at most 9")
+        if self.width == 9:
+            raise ValueError("width and lens exclude each other")
+        if self.width == 8:
+            raise ValueError("lens.a: expected none")
+        if self.width == 7:
+            raise ValueError("neither fits")
+        return self
+
+
+@pytest.mark.parametrize(("text", "wanted"), [
+    ("{width: 12}", "x.yaml:1:9: p.width: 12 is too wide; expected at most 9"),
+    ("{width: 9}", "x.yaml:1:9: p.width: width and lens exclude each other"),
+    ("{width: 8, lens: {a: 1}}", "x.yaml:1:22: p.lens.a: expected none"),
+    ("{width: 8}", "x.yaml:1:1: p: lens.a: expected none"),
+    ("{width: 7}", "x.yaml:1:1: p: neither fits"),
+])  # fmt: skip
+def test_a_fault_that_begins_with_a_field_is_placed_at_this_field(text: str, wanted: str) -> None:
+    """A check of several fields reports one of them; a field with its default has no place."""
+    problems = Problems()
+    validate(parse_yaml(text, "x.yaml"), Parts, problems, "p")
+    assert [str(one).splitlines()[0] for one in problems.sorted()] == [wanted]

@@ -32,6 +32,17 @@ def test_contact_sheet_of_a_dataset_has_one_tile_per_sample(dataset: Path, tmp_p
     assert sheet.std() > 20
 
 
+def test_contact_sheets_are_png(dataset: Path, tmp_path: Path) -> None:
+    sheet = ("contact-sheet", str(dataset), "--n", "1", "--tile-px", "40", "--out")
+    done = gen_data(*sheet, "x.jpg", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "gen-data: --out x.jpg: a contact sheet is a PNG; expected x.png\n"
+
+    done = gen_data(*sheet, "x.PNG", cwd=tmp_path)
+    assert done.stdout == "x.PNG: 1 tile\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.PNG"]
+
+
 @needs_rerun
 def test_recording_is_accepted_by_rerun(tmp_path: Path) -> None:
     """``rerun rrd verify`` reads what ``preview --save`` wrote."""

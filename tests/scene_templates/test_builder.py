@@ -269,7 +269,8 @@ def test_assets_are_chosen_by_tags_and_ids(chosen: dict[str, Any], assets: set[s
     ({**ARM, "on": "tabel"}, r"elements\.arm\.on: .*'tabel'.*did you mean 'table'"),
     (clutter(count=400), r"elements\.clutter\.count: 400 objects do not fit .*'table'"),
     (clutter(count=60, placement="scatter"), r"elements\.clutter\.count: 60 objects do not"),
-    (clutter(assets={"tags": ["no_such_tag"]}), r"elements\.clutter\.assets: no asset matches"),
+    (clutter(assets={"tags": ["part", "toy"]}), r"elements\.clutter\.assets: no asset matches"),
+    (clutter(assets={"tags": ["no_such_tag"]}), r"elements\.clutter\.assets\.tags: no object has"),
     ({**DESK, "height_m": 0.5}, r"elements\.table: two elements have this name"),
 ])  # fmt: skip
 def test_impossible_relations_are_told_with_their_place(line: dict[str, Any], message: str) -> None:

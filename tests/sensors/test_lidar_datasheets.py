@@ -203,7 +203,7 @@ FAULTS = [
     )),
     # Offsets that belong to no laser.
     *((SHORT, f"like: VLP-16\nelevations_deg: {lasers}\nazimuth_offsets_deg: {offsets}\n",
-       f"s.yaml:1:1: sensors[1].model: azimuth_offsets_deg: expected one number for each of {fact}")
+       f"s.yaml:3:22: sensors[1].model.azimuth_offsets_deg: expected one number for each of {fact}")
       for lasers, offsets, fact in (
         ("[-10, 5, 0, -5]", "[1, 2]",
          "4 lasers, as they are not listed from the top, or fewer that repeat evenly, got 2"),

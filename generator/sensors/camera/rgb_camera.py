@@ -124,7 +124,7 @@ class RgbCamera(Mounted):
     def _has_a_lens(self) -> "RgbCamera":
         if isinstance(self.lens, lens_models.Pinhole) and self.hfov_deg > PINHOLE_MAX_DEG:
             raise ValueError(
-                f"hfov_deg {self.hfov_deg:g} is too wide for a pinhole; expected at most "
+                f"hfov_deg: {self.hfov_deg:g} is too wide for a pinhole; expected at most "
                 f"{PINHOLE_MAX_DEG:g}, or another lens, such as {{model: kannala_brandt}}"
             )
         calibrated = isinstance(self.lens, lens_models.CalibratedLens)
