@@ -145,7 +145,7 @@ def test_init_takes_every_mesh_with_the_files_that_it_refers_to(tmp_path: Path) 
     config = load_config(str(tmp_path / "my parts/tabletop.yaml"))
     (group,) = [e for e in config.resolved["elements"] if e["name"] == "clutter"]
     classes = ["red duck", "blue", "loose", "bolt"]
-    assert list(config.resolved["labels"]["map"]["classes"]) == classes
+    assert [*config.general.labels.map.classes_of] == classes
     assets = {i: library_asset(tmp_path / "my parts/assets", i) for i in group["assets"]["ids"]}
     assert [asset.category for asset in assets.values()] == [*classes, "bolt"]
     albedos = [asset_albedo(tmp_path / "my parts/assets", i) for i in list(assets)[:2]]
@@ -174,9 +174,8 @@ def test_the_comments_of_init_tell_how_to_omit_the_robot(template: str, tmp_path
     assert done.returncode == 0, done.stderr
     file, scene = (tmp_path / f"{template}{end}.yaml" for end in ("", "_scene"))
     text = file.read_text()
-    deleted = re.findall(r"delete the (element|randomizer) '(\w+)'|the randomizer '(\w+)'", text)
-    names = {one or other for _, one, other in deleted}
-    for path in (file, scene):
+    named = {kind: re.findall(rf"the {kind} '(\w+)'", text) for kind in ("randomizer", "element")}
+    for path, names in ((file, named["randomizer"]), (scene, named["element"])):
         lines = path.read_text().splitlines(keepends=True)
         kept = [k for k in lines if not any(re.search(rf"name: {n}\b", k) for n in names)]
         path.write_text("".join(kept))
