@@ -1,6 +1,6 @@
 """Samples whose labels a label map has changed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -48,7 +48,7 @@ class RelabelledSample:
     @cached_property
     def capture(self) -> Capture:
         """Readings of all sensors; category ids are the classes of instances."""
-        from gen_data.exporters.point_cloud_io import class_facts, with_classes
+        from gen_data.exporters.point_cloud_io import class_facts, class_table, with_classes
         from gen_data.runner.stored import ReadOnAccess
 
         read = self.record.capture
@@ -57,8 +57,18 @@ class RelabelledSample:
             return read
 
         def reading(name: str) -> SensorReading:
-            images = ClassImages(read.readings[name].channels, classes)
-            return replace(read.readings[name], channels=images)
+            found = read.readings[name]
+            images = found.channels
+
+            def image(channel: Channel) -> NDArray[Any]:
+                if channel is not Channel.CATEGORY:
+                    return images[channel]
+                mapped: NDArray[Any] = class_table(classes)[images[Channel.INSTANCE]]
+                return mapped
+
+            # Category ids without instance ids are of other categories.
+            kept = (c for c in images if c is not Channel.CATEGORY or Channel.INSTANCE in images)
+            return replace(found, channels=ReadOnAccess(kept, image))
 
         def cloud(name: str) -> PointCloud:
             found = read.clouds[name]
@@ -88,43 +98,6 @@ class RelabelledSample:
     def scene(self) -> Scene:
         """The world with mapped instances."""
         return self.applied.map_scene(self.record.scene)
-
-
-class ClassImages(Mapping[Channel, NDArray[Any]]):
-    """Images of a camera whose category ids are the classes of instances.
-
-    There are none of a camera without instance ids, as stored ones are of other categories.
-    """
-
-    def __init__(self, images: Mapping[Channel, NDArray[Any]], classes: Mapping[str, int]) -> None:
-        self._images, self._classes = images, classes
-        known = tuple(images)
-        self._channels = tuple(
-            c for c in known if c is not Channel.CATEGORY or Channel.INSTANCE in known
-        )
-
-    def __getitem__(self, channel: Channel) -> NDArray[Any]:
-        """Decode one image."""
-        from gen_data.exporters.point_cloud_io import class_table
-
-        if channel is not Channel.CATEGORY:
-            return self._images[channel]
-        if channel not in self._channels:
-            raise KeyError(channel)
-        classes: NDArray[Any] = class_table(self._classes)[self._images[Channel.INSTANCE]]
-        return classes
-
-    def __contains__(self, channel: object) -> bool:
-        """Whether there is such an image; decodes nothing."""
-        return channel in self._channels
-
-    def __iter__(self) -> Iterator[Channel]:
-        """The channels, in order."""
-        return iter(self._channels)
-
-    def __len__(self) -> int:
-        """Number of channels."""
-        return len(self._channels)
 
 
 @dataclass(frozen=True)

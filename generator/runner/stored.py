@@ -35,6 +35,7 @@ from gen_data.runner import durable_files, failed_sample, layout, plan, store
 from gen_data.runner.labels import LABELS_NAME, Labels, parse_labels
 from gen_data.runner.provenance import SCENES_NAME, KeptScene, parse_scene
 
+K = TypeVar("K")
 T = TypeVar("T")
 
 SHARDS_KEPT = 16
@@ -376,14 +377,14 @@ class LabelledImages:
         return self.read_scene(self.index).scene
 
 
-class ReadOnAccess(Mapping[str, T], Generic[T]):
-    """Values by name, read from disk at each access."""
+class ReadOnAccess(Mapping[K, T], Generic[K, T]):
+    """Values by name or channel, read from disk at each access."""
 
-    def __init__(self, names: Iterable[str], read: Callable[[str], T]) -> None:
+    def __init__(self, names: Iterable[K], read: Callable[[K], T]) -> None:
         self._names = tuple(names)
         self._read = read
 
-    def __getitem__(self, name: str) -> T:
+    def __getitem__(self, name: K) -> T:
         """Read one value."""
         if name not in self._names:
             raise KeyError(name)
@@ -393,7 +394,7 @@ class ReadOnAccess(Mapping[str, T], Generic[T]):
         """Whether there is such a value; reads nothing."""
         return name in self._names
 
-    def __iter__(self) -> Iterator[str]:
+    def __iter__(self) -> Iterator[K]:
         """The names."""
         return iter(self._names)
 
